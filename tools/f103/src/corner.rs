@@ -36,7 +36,7 @@ impl Corner {
         }
     }
 
-    /// What instructions cost.
+    /// Returns what instructions cost.
     #[must_use]
     pub const fn costs(self) -> Costs {
         match self {
@@ -45,7 +45,7 @@ impl Corner {
         }
     }
 
-    /// The oscillators, with a crystal of 8 MHz.
+    /// Returns the oscillators, with a crystal of 8 MHz.
     #[must_use]
     pub const fn oscillators(self) -> Oscillators {
         match self {
@@ -68,7 +68,7 @@ impl Corner {
         }
     }
 
-    /// Cycles of a timer after which the flags of an update event by software (UG) appear in SR.
+    /// Returns the cycles of a timer after which the flags of an update event by software (UG) appear in SR.
     ///
     /// On two boards SR read 0 in the next instructions after UG (labwired-core, `f103_conformance.rs`): a delay of at
     /// least 4 cycles at 8 MHz in this simulator. It may be more where a timer runs at twice PCLK.
@@ -80,7 +80,7 @@ impl Corner {
         }
     }
 
-    /// How far a conversion of the ADC may be off, in LSB either way.
+    /// Returns how far a conversion of the ADC may be off, in LSB either way.
     #[must_use]
     pub const fn adc_noise(self) -> u16 {
         match self {

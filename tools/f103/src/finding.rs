@@ -169,7 +169,7 @@ impl Findings {
         }
     }
 
-    /// Everything recorded so far.
+    /// Returns everything recorded so far.
     #[must_use]
     pub fn as_slice(&self) -> &[Finding] {
         &self.list

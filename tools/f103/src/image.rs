@@ -77,7 +77,7 @@ impl Image {
         })
     }
 
-    /// Plain machine code put at the start of flash: its vector table first. It has no symbols.
+    /// Takes plain machine code, which goes to the start of flash: its vector table first. It has no symbols.
     ///
     /// # Errors
     ///
@@ -95,26 +95,26 @@ impl Image {
         })
     }
 
-    /// Where it starts, as the ELF header says (bit 0 set: Thumb).
+    /// Returns where it starts, as the ELF header says (bit 0 set: Thumb).
     #[must_use]
     pub fn entry(&self) -> u32 {
         self.entry
     }
 
-    /// The address of a symbol; a function's has bit 0 set (Thumb).
+    /// Returns the address of a symbol; a function's has bit 0 set (Thumb).
     #[must_use]
     pub fn symbol(&self, name: &str) -> Option<u32> {
         self.symbols.get(name).copied()
     }
 
-    /// Every symbol, by name.
+    /// Returns every symbol, by name.
     pub fn symbols(&self) -> impl Iterator<Item = (&str, u32)> {
         self.symbols
             .iter()
             .map(|(name, &address)| (name.as_str(), address))
     }
 
-    /// How many bytes of flash it fills.
+    /// Returns how many bytes of flash it fills.
     #[must_use]
     pub fn size(&self) -> usize {
         self.segments.iter().map(|(_, data)| data.len()).sum()
@@ -142,7 +142,7 @@ impl Image {
     }
 }
 
-/// The offset into flash of `length` bytes at `address`.
+/// Returns the offset into flash of `length` bytes at `address`.
 fn flash_offset(address: u32, length: usize) -> Result<usize, Error> {
     let offset = address.wrapping_sub(FLASH_BASE) as usize;
     if offset < LARGEST_FLASH && length <= LARGEST_FLASH - offset {

@@ -92,7 +92,7 @@ pub const STM32F103RC: Part = Part {
 };
 
 impl Part {
-    /// The unmodelled block at `address` that only larger parts have, if this part has it.
+    /// Returns the unmodelled block at `address` that only larger parts have, if this part has it.
     #[must_use]
     pub fn unmodelled(&self, address: u32) -> Option<&'static str> {
         self.more_blocks

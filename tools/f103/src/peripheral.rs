@@ -44,6 +44,7 @@ pub trait Peripheral {
     /// Resets the block: a system reset, or its bit in RCC_APB1RSTR or RCC_APB2RSTR.
     fn reset(&mut self, now: Time);
 
-    /// Sets the kernel clock of the block to `hz` Hz from `now` on: the timer clock of a timer, PCLK of any other block.
+    /// Sets the kernel clock of the block to `hz` Hz from `now` on: the timer clock of a timer, PCLK of any other
+    /// block.
     fn set_clock(&mut self, _hz: u32, _now: Time) {}
 }

@@ -5,8 +5,8 @@
 //! +16  number of up channels                (32-bit words)
 //! +20  number of down channels
 //! ```
-//! The read offset is moved at fixed instants of the virtual time, [`POLL`] apart, whatever the pieces in which a caller
-//! lets the time pass. So the state of the buffer at an instant is the same in every run.
+//! The read offset is moved at fixed instants of the virtual time, [`POLL`] apart, whatever the pieces in which a
+//! caller lets the time pass. So the state of the buffer at an instant is the same in every run.
 
 use crate::machine::memory::RAM_BASE;
 use crate::time::Time;
@@ -41,7 +41,7 @@ struct Unread {
 }
 
 impl Log {
-    /// For a control block at `address`, the image's symbol `_SEGGER_RTT`.
+    /// Returns a log with a control block at `address`, the image's symbol `_SEGGER_RTT`.
     #[must_use]
     pub fn new(address: Option<u32>) -> Self {
         Self {
@@ -50,7 +50,7 @@ impl Log {
         }
     }
 
-    /// Whether there is anything to poll.
+    /// Returns whether there is anything to poll.
     #[must_use]
     pub fn is_present(&self) -> bool {
         self.block.is_some()
@@ -69,7 +69,7 @@ impl Log {
         self.shown = 0;
     }
 
-    /// Everything written since the last call, also what still is in the buffer.
+    /// Returns everything written since the last call, also what still is in the buffer.
     pub fn take(&mut self, ram: &[u8]) -> String {
         let mut text = core::mem::take(&mut self.text);
         if let Some(unread) = self.unread(ram) {
@@ -81,7 +81,7 @@ impl Log {
         String::from_utf8_lossy(&text).into_owned()
     }
 
-    /// The channel as it stands, if the block has been set up and makes sense.
+    /// Returns the channel as it stands, if the block has been set up and makes sense.
     fn unread(&self, ram: &[u8]) -> Option<Unread> {
         let block = self.block?;
         let header = ram.get(block..block + READ + 4)?;

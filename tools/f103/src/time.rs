@@ -20,38 +20,38 @@ impl Time {
     /// Later than anything that happens: 213 days.
     pub const MAX: Self = Self(u64::MAX);
 
-    /// From picoseconds.
+    /// Returns a span of picoseconds.
     #[must_use]
     pub const fn from_ps(ps: u64) -> Self {
         Self(ps)
     }
 
-    /// From nanoseconds; saturates at [`Time::MAX`], as all the others do.
+    /// Returns a span of nanoseconds; saturates at [`Time::MAX`], as all the others do.
     #[must_use]
     pub const fn from_ns(ns: u64) -> Self {
         Self(ns.saturating_mul(1_000))
     }
 
-    /// From microseconds.
+    /// Returns a span of microseconds.
     #[must_use]
     pub const fn from_us(us: u64) -> Self {
         Self(us.saturating_mul(1_000_000))
     }
 
-    /// From milliseconds.
+    /// Returns a span of milliseconds.
     #[must_use]
     pub const fn from_ms(ms: u64) -> Self {
         Self(ms.saturating_mul(1_000_000_000))
     }
 
-    /// From seconds.
+    /// Returns a span of seconds.
     #[must_use]
     pub const fn from_secs(s: u64) -> Self {
         Self(s.saturating_mul(PS_PER_S))
     }
 
-    /// The span of `n` cycles of a clock of `hz` Hz, rounded down to the picosecond. A clock of
-    /// 0 Hz never gets there: [`Time::MAX`].
+    /// Returns the span of `n` cycles of a clock of `hz` Hz, rounded down to the picosecond. A clock of 0 Hz never gets
+    /// there: [`Time::MAX`].
     #[must_use]
     pub const fn cycles(n: u64, hz: u32) -> Self {
         if hz == 0 {
@@ -69,8 +69,8 @@ impl Time {
         }
     }
 
-    /// How many whole cycles of a clock of `hz` Hz have ended in this span: the inverse of
-    /// [`Time::cycles`], so `Time::cycles(n, hz).in_cycles(hz) == n` for every `n` that fits.
+    /// Returns how many whole cycles of a clock of `hz` Hz have ended in this span: the inverse of [`Time::cycles`], so
+    /// `Time::cycles(n, hz).in_cycles(hz) == n` for every `n` that fits.
     #[must_use]
     pub const fn in_cycles(self, hz: u32) -> u64 {
         // `cycles` rounds down, so the last picosecond of cycle n - 1 already counts as cycle n:
@@ -81,37 +81,37 @@ impl Time {
         (((self.0 as u128 + 1) * hz as u128 - 1) / PS_PER_S as u128) as u64
     }
 
-    /// In picoseconds.
+    /// Returns the span in picoseconds.
     #[must_use]
     pub const fn as_ps(self) -> u64 {
         self.0
     }
 
-    /// In whole nanoseconds, rounded down.
+    /// Returns the span in whole nanoseconds, rounded down.
     #[must_use]
     pub const fn as_ns(self) -> u64 {
         self.0 / 1_000
     }
 
-    /// In whole microseconds, rounded down.
+    /// Returns the span in whole microseconds, rounded down.
     #[must_use]
     pub const fn as_us(self) -> u64 {
         self.0 / 1_000_000
     }
 
-    /// In whole milliseconds, rounded down.
+    /// Returns the span in whole milliseconds, rounded down.
     #[must_use]
     pub const fn as_ms(self) -> u64 {
         self.0 / 1_000_000_000
     }
 
-    /// In seconds, for people to read.
+    /// Returns the span in seconds, for people to read.
     #[must_use]
     pub fn as_secs_f64(self) -> f64 {
         self.0 as f64 / PS_PER_S as f64
     }
 
-    /// The sum, or `None` past the end of time.
+    /// Returns the sum, or `None` past the end of time.
     #[must_use]
     pub const fn checked_add(self, span: Self) -> Option<Self> {
         match self.0.checked_add(span.0) {
@@ -120,7 +120,7 @@ impl Time {
         }
     }
 
-    /// The difference, or `None` when `earlier` is later.
+    /// Returns the difference, or `None` when `earlier` is later.
     #[must_use]
     pub const fn checked_sub(self, earlier: Self) -> Option<Self> {
         match self.0.checked_sub(earlier.0) {
@@ -129,7 +129,7 @@ impl Time {
         }
     }
 
-    /// The difference, or an empty span when `earlier` is later.
+    /// Returns the difference, or an empty span when `earlier` is later.
     #[must_use]
     pub const fn saturating_sub(self, earlier: Self) -> Self {
         Self(self.0.saturating_sub(earlier.0))

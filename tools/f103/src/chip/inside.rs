@@ -13,13 +13,13 @@ impl<C: Circuit> Chip<C> {
         self.machine.take_log()
     }
 
-    /// Contents of the flash.
+    /// Returns the contents of the flash.
     #[must_use]
     pub fn flash(&self) -> &[u8] {
         self.machine.bus.soc.flash.bytes()
     }
 
-    /// Contents of the flash, for changing them.
+    /// Returns the contents of the flash, for changing them.
     ///
     /// # Errors
     ///
@@ -72,7 +72,7 @@ impl<C: Circuit> Chip<C> {
         self.machine.bus.soc.flash.changes().get()
     }
 
-    /// Number of flash operations that were started since the chip was made.
+    /// Returns the number of flash operations that were started since the chip was made.
     #[must_use]
     pub fn flash_operations(&self) -> u64 {
         self.machine.bus.soc.flash.started()
@@ -93,18 +93,18 @@ impl<C: Circuit> Chip<C> {
         self.machine.bus.soc.flash.torn = torn;
     }
 
-    /// Contents of the SRAM.
+    /// Returns the contents of the SRAM.
     #[must_use]
     pub fn ram(&self) -> &[u8] {
         self.machine.ram()
     }
 
-    /// Contents of the SRAM, for changing them as with a debug probe.
+    /// Returns the contents of the SRAM, for changing them as with a debug probe.
     pub fn ram_mut(&mut self) -> &mut [u8] {
         self.machine.ram_mut()
     }
 
-    /// The word at `address` in flash or SRAM; `None` at any other address.
+    /// Returns the word at `address` in flash or SRAM; `None` at any other address.
     #[must_use]
     pub fn word(&self, address: u32) -> Option<u32> {
         let read = |bytes: &[u8], base: u32| {
@@ -115,7 +115,7 @@ impl<C: Circuit> Chip<C> {
         read(self.ram(), RAM_BASE).or_else(|| read(self.flash(), FLASH_BASE))
     }
 
-    /// Address of a symbol of the image. The address of a function has bit 0 set (Thumb).
+    /// Returns the address of a symbol of the image. The address of a function has bit 0 set (Thumb).
     #[must_use]
     pub fn symbol(&self, name: &str) -> Option<u32> {
         self.symbols.get(name).copied()
@@ -127,32 +127,32 @@ impl<C: Circuit> Chip<C> {
         self.machine.bus.findings.as_slice()
     }
 
-    /// Whether the core has locked up. Only a reset ends this state.
+    /// Returns whether the core has locked up. Only a reset ends this state.
     #[must_use]
     pub fn locked_up(&self) -> bool {
         self.machine.locked_up()
     }
 
-    /// Whether the core waits in WFI or WFE.
+    /// Returns whether the core waits in WFI or WFE.
     #[must_use]
     pub fn asleep(&self) -> bool {
         self.machine.asleep()
     }
 
-    /// Address of the next instruction.
+    /// Returns the address of the next instruction.
     #[must_use]
     pub fn pc(&self) -> u32 {
         self.machine.pc()
     }
 
-    /// Value of a core register: 0 to 12 are R0 to R12, 13 SP, 14 LR, 15 PC, 16 xPSR, 17 MSP, 18 PSP, 19 PRIMASK,
-    /// 20 BASEPRI, 21 FAULTMASK, 22 CONTROL; `None` for any other number.
+    /// Returns the value of a core register: 0 to 12 are R0 to R12, 13 SP, 14 LR, 15 PC, 16 xPSR, 17 MSP, 18 PSP, 19
+    /// PRIMASK, 20 BASEPRI, 21 FAULTMASK, 22 CONTROL; `None` for any other number.
     #[must_use]
     pub fn register(&self, number: usize) -> Option<u32> {
         self.machine.register(number)
     }
 
-    /// Frequency of HCLK in Hz. SysTick and DWT count its cycles.
+    /// Returns the frequency of HCLK in Hz. SysTick and DWT count its cycles.
     #[must_use]
     pub fn hclk(&self) -> u32 {
         self.machine.bus.soc.rcc.clocks().hclk

@@ -8,13 +8,13 @@ use crate::soc::Circuit;
 use crate::time::Time;
 
 impl<C: Circuit> Chip<C> {
-    /// USART1, as of the last instruction: what it sends next, and when.
+    /// Returns USART1 as of the last instruction: what it sends next, and when.
     #[must_use]
     pub const fn usart1(&self) -> &Usart {
         self.machine.bus.soc.usart1()
     }
 
-    /// The circuit, for changes that the part sees only at an RX pin, or not at all. Call
+    /// Returns the circuit, for changes that the part sees only at an RX pin, or not at all. Call
     /// [`wires_changed`](Self::wires_changed) after a change of the next edges at an RX pin, and [`sync`](Self::sync)
     /// before reading what the circuit has recorded.
     pub const fn circuit_mut(&mut self) -> &mut C {
@@ -46,8 +46,8 @@ impl<C: Circuit> Chip<C> {
         }
     }
 
-    /// The core executes nothing before this instant, as far as is known: [`Time::MAX`] if it sleeps and no event is
-    /// due.
+    /// Returns the instant before which the core executes nothing, as far as is known: [`Time::MAX`] if it sleeps and
+    /// no event is due.
     #[must_use]
     pub fn next_instruction(&self) -> Time {
         self.machine.next_instruction()

@@ -9,19 +9,19 @@ use crate::machine::waits::Wait;
 use crate::soc::Circuit;
 
 impl<C: Circuit> Chip<C> {
-    /// Number of instructions that were executed since the chip was made.
+    /// Returns the number of instructions that were executed since the chip was made.
     #[must_use]
     pub fn instructions(&self) -> u64 {
         self.machine.instructions()
     }
 
-    /// Number of cycles of HCLK since the chip was made, also while the core slept.
+    /// Returns the number of cycles of HCLK since the chip was made, also while the core slept.
     #[must_use]
     pub fn cycles(&self) -> u64 {
         self.machine.cycles()
     }
 
-    /// Times that the core has spent running, stalled, asleep and off, since the chip was made.
+    /// Returns the times that the core has spent running, stalled, asleep and off, since the chip was made.
     #[must_use]
     pub fn core_time(&self) -> CoreTime {
         self.machine.core_time()
@@ -33,9 +33,10 @@ impl<C: Circuit> Chip<C> {
         self.machine.measure_waits(on);
     }
 
-    /// Waits of an exception since [`Chip::measure_waits`]: the time from pending and enabled to the entry of its
-    /// handler. 14 is PendSV, 15 SysTick, 16 + n interrupt line n ([`crate::soc::map::irq`]). For the other exceptions
-    /// only the entries are counted. All values are 0 without a measurement, or if the number does not exist.
+    /// Returns the waits of an exception since [`Chip::measure_waits`]: the time from pending and enabled to the entry
+    /// of its handler. 14 is PendSV, 15 SysTick, 16 + n interrupt line n ([`crate::soc::map::irq`]). For the other
+    /// exceptions only the entries are counted. All values are 0 without a measurement, or if the number does not
+    /// exist.
     #[must_use]
     pub fn wait(&self, exception: usize) -> Wait {
         self.machine.wait(exception)

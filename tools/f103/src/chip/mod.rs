@@ -1,6 +1,6 @@
 //! An STM32F103 in a circuit. This module has power and time, [`pins`] the pins, the crystal and the supply, [`inside`]
-//! the memories, [`joined`] the run with other chips on one wire, [`measure`] the measurements, and [`debug`] the methods
-//! for a debugger.
+//! the memories, [`joined`] the run with other chips on one wire, [`measure`] the measurements, and [`debug`] the
+//! methods for a debugger.
 
 mod debug;
 mod inside;
@@ -34,7 +34,7 @@ pub struct Chip<C> {
 }
 
 impl<C: Circuit> Chip<C> {
-    /// A part with `image` in its flash, powered on at time 0 in `circuit`.
+    /// Returns a part with `image` in its flash, powered on at time 0 in `circuit`.
     ///
     /// # Errors
     ///
@@ -69,13 +69,13 @@ impl<C: Circuit> Chip<C> {
         })
     }
 
-    /// Whether the core uses code that was translated for an earlier chip.
+    /// Returns whether the core uses code that was translated for an earlier chip.
     #[must_use]
     pub fn core_is_used(&self) -> bool {
         self.machine.core_is_used()
     }
 
-    /// The circuit, for reading.
+    /// Returns the circuit, for reading.
     #[must_use]
     pub fn circuit(&self) -> &C {
         &self.machine.bus.soc.circuit
@@ -89,7 +89,7 @@ impl<C: Circuit> Chip<C> {
         answer
     }
 
-    /// The virtual time.
+    /// Returns the virtual time.
     #[must_use]
     pub fn now(&self) -> Time {
         self.machine.now()
@@ -149,7 +149,7 @@ impl<C: Circuit> Chip<C> {
         self.power_on();
     }
 
-    /// Whether the power is on.
+    /// Returns whether the power is on.
     #[must_use]
     pub fn powered(&self) -> bool {
         self.machine.powered()
@@ -161,7 +161,7 @@ impl<C: Circuit> Chip<C> {
         self.machine.cut_in_flash_operation(nth, fraction);
     }
 
-    /// Number of times that the power was switched on.
+    /// Returns the number of times that the power was switched on.
     #[must_use]
     pub fn power_ons(&self) -> u64 {
         self.machine.power_ons()
@@ -174,7 +174,7 @@ impl<C: Circuit> Chip<C> {
         }
     }
 
-    /// Number of resets since power-on: by the watchdog, by software or by the pin.
+    /// Returns the number of resets since power-on: by the watchdog, by software or by the pin.
     #[must_use]
     pub fn resets(&self) -> u32 {
         self.machine.resets()

@@ -6,7 +6,7 @@ use crate::soc::{Circuit, Pin};
 use crate::time::Time;
 
 impl<C: Circuit> Chip<C> {
-    /// Whether the 8 MHz crystal works.
+    /// Returns whether the 8 MHz crystal works.
     #[must_use]
     pub fn crystal(&self) -> bool {
         self.machine.bus.soc.rcc.crystal()
@@ -19,7 +19,7 @@ impl<C: Circuit> Chip<C> {
         self.machine.bus.soc.set_crystal(works, now);
     }
 
-    /// Frequencies of HSI and LSI in Hz.
+    /// Returns the frequencies of HSI and LSI in Hz.
     #[must_use]
     pub fn rc_oscillators(&self) -> (u32, u32) {
         let oscillators = self.machine.bus.soc.rcc.oscillators();
@@ -47,7 +47,7 @@ impl<C: Circuit> Chip<C> {
         Ok(())
     }
 
-    /// Supply voltage of the part, in mV.
+    /// Returns the supply voltage of the part, in mV.
     #[must_use]
     pub fn supply_mv(&self) -> u16 {
         self.machine.bus.soc.pwr.supply_mv()
@@ -84,14 +84,15 @@ impl<C: Circuit> Chip<C> {
         self.machine.bus.soc.disturb_i2c(now)
     }
 
-    /// Level of a pin, as a logic probe shows it: port `'A'` to `'D'`, pin 0 to 15. Low for a pin that does not exist.
+    /// Returns the level of a pin, as a logic probe shows it: port `'A'` to `'D'`, pin 0 to 15. Low for a pin that does
+    /// not exist.
     #[must_use]
     pub fn pin(&self, port: char, pin: u8) -> bool {
         self.look(port, pin)
             .is_some_and(|(gpio, pin)| gpio.level() >> pin & 1 != 0)
     }
 
-    /// Whether a pin is an output; false for a pin that does not exist.
+    /// Returns whether a pin is an output; false for a pin that does not exist.
     #[must_use]
     pub fn is_output(&self, port: char, pin: u8) -> bool {
         self.look(port, pin)
@@ -105,14 +106,14 @@ impl<C: Circuit> Chip<C> {
         }
     }
 
-    /// The recorded edges of a watched pin: each with its instant and the level after it.
+    /// Returns the recorded edges of a watched pin: each with its instant and the level after it.
     #[must_use]
     pub fn pin_edges(&self, port: char, pin: u8) -> &[(Time, bool)] {
         self.look(port, pin)
             .map_or(&[], |(gpio, pin)| gpio.edges(pin))
     }
 
-    /// The port of a pin, and the number of the pin in the port.
+    /// Returns the port of a pin, and the number of the pin in the port.
     fn look(&self, port: char, pin: u8) -> Option<(&Gpio, usize)> {
         let pin = Pin::find(port, pin.into())?;
         Some((&self.machine.bus.soc.gpio[pin.port_index()], pin.number()))

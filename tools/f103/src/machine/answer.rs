@@ -52,7 +52,7 @@ impl<C: Circuit> Bus<C> {
         }
     }
 
-    /// The offset into flash of `address`, at its own place or at 0.
+    /// Returns the offset into flash of `address`, at its own place or at 0.
     pub(crate) fn flash_offset(&self, address: u32) -> Option<u32> {
         [FLASH_BASE, 0]
             .into_iter()

@@ -116,7 +116,7 @@ impl<C: Circuit> Bus<C> {
         self.clock.set_rate(count, hclk);
     }
 
-    /// Whether every read of constants in flash comes here, to be charged.
+    /// Returns whether every read of constants in flash comes here, to be charged.
     pub(super) fn charges_tables(&self) -> bool {
         self.segments.pace().costs.charges_tables
     }
@@ -179,7 +179,7 @@ impl<C: Circuit> CoreBus for Bus<C> {
         answer.map(u64::from)
     }
 
-    /// The core's own time is the cycle of HCLK: its SysTick counts exactly those, whatever their rate.
+    /// Returns the core's own time, which is the cycle of HCLK: its SysTick counts exactly those, whatever their rate.
     fn time(&self, instructions: u64) -> VirtualNanos {
         VirtualNanos(self.clock.cycle(instructions))
     }

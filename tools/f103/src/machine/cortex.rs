@@ -9,7 +9,7 @@ use rigless::soc::Endian;
 
 use crate::part::Part;
 
-/// The Cortex-M3 of the STM32F103 (PM0056): no MPU, four priority bits.
+/// Returns the Cortex-M3 of the STM32F103 (PM0056): no MPU, four priority bits.
 pub(super) fn m3(part: &Part) -> Box<dyn Processor> {
     // The core's time unit is a cycle of HCLK, so its clock has as many to the second as the unit, a
     // nanosecond by name, does. SysTick's other clock is HCLK / 8 (RM0008 figure 8).

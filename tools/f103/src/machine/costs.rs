@@ -140,13 +140,13 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// Additional cost of a read of constants in flash, compared with a read of SRAM.
+    /// Returns the additional cost of a read of constants in flash, compared with a read of SRAM.
     #[must_use]
     pub const fn flash_read(&self) -> u32 {
         self.wait_states + self.conflict()
     }
 
-    /// The wait for a prefetch under way: it takes as long as any read.
+    /// Returns the wait for a prefetch under way: it takes as long as any read.
     const fn conflict(&self) -> u32 {
         if self.costs.prefetch_under_way && self.prefetch && self.wait_states > 0 {
             1 + self.wait_states
@@ -155,7 +155,7 @@ impl Pace {
         }
     }
 
-    /// The cycles that a taken branch to flash or to SRAM takes beside its first one.
+    /// Returns the cycles that a taken branch to flash or to SRAM takes beside its first one.
     #[must_use]
     pub const fn taken(&self, to_flash: bool) -> u32 {
         if to_flash {
@@ -165,7 +165,7 @@ impl Pace {
         }
     }
 
-    /// The cycles that a branch in flash takes beside its first one when it is not taken.
+    /// Returns the cycles that a branch in flash takes beside its first one when it is not taken.
     #[must_use]
     pub const fn not_taken(&self) -> u32 {
         if self.costs.needless_fetch {
@@ -175,26 +175,26 @@ impl Pace {
         }
     }
 
-    /// The entry of an exception.
+    /// Returns the entry of an exception.
     #[must_use]
     pub const fn entry(&self) -> u32 {
         self.costs.entry + self.costs.entry_reads * self.wait_states + self.conflict()
     }
 
-    /// The return from an exception.
+    /// Returns the return from an exception.
     #[must_use]
     pub const fn exit(&self) -> u32 {
         self.costs.exit + self.wait_states + self.conflict()
     }
 
-    /// From the end of a handler to the next one.
+    /// Returns the cost from the end of a handler to the next one.
     #[must_use]
     pub const fn tail_chain(&self) -> u32 {
         self.costs.tail_chain + self.costs.entry_reads * self.wait_states + self.conflict()
     }
 
-    /// Additional cost of an access to a block, compared with an access to SRAM: on the AHB, or on an APB that runs at
-    /// HCLK divided by `divider`.
+    /// Returns the additional cost of an access to a block, compared with an access to SRAM: on the AHB, or on an APB
+    /// that runs at HCLK divided by `divider`.
     #[must_use]
     pub const fn block(&self, write: bool, divider: Option<u32>) -> u32 {
         let Some(divider) = divider else {

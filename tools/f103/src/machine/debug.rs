@@ -53,7 +53,7 @@ impl<C: Circuit> Machine<C> {
         self.core.set_gdb_register(number, &value.to_le_bytes())
     }
 
-    /// The byte at `address` of the system control space, read without a side effect; `None` elsewhere.
+    /// Returns the byte at `address` of the system control space, read without a side effect; `None` elsewhere.
     pub fn system_control(&mut self, address: u32) -> Option<u8> {
         if !SCS.contains(&address) {
             return None;

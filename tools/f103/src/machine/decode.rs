@@ -57,7 +57,7 @@ pub fn decode(first: u16, second: u16) -> (u32, Class, End) {
     }
 }
 
-/// A load or a store of one register.
+/// Returns a load or a store of one register.
 const fn access(load: bool) -> (Class, End) {
     let class = if load { Class::Load } else { Class::Store };
     (class, End::Sequential)
@@ -79,7 +79,7 @@ fn narrow(code: u32) -> (Class, End) {
     }
 }
 
-/// Data processing, special data instructions, branch and exchange: A5.2.2, A5.2.3.
+/// Returns the data processing, special data instructions, branch and exchange: A5.2.2, A5.2.3.
 fn special(code: u32) -> (Class, End) {
     let to_pc = code & 0x87 == 0x87;
     let end = match code >> 8 & 7 {

@@ -30,13 +30,13 @@ pub struct Dwt {
 }
 
 impl Dwt {
-    /// Whether [`look`](Self::look) must be called after this instruction.
+    /// Returns whether [`look`](Self::look) must be called after this instruction.
     #[must_use]
     pub fn awaits_look(&self) -> bool {
         self.kept.is_some()
     }
 
-    /// Whether a change of DEMCR has an effect.
+    /// Returns whether a change of DEMCR has an effect.
     #[must_use]
     pub fn in_use(&self) -> bool {
         self.running || self.kept.is_some()

@@ -1,7 +1,7 @@
 //! A memory of the part, the flash or the SRAM.
 //!
-//! The core accesses a memory through a raw pointer while it runs. So a [`Memory`] owns its bytes through a raw pointer,
-//! too, and lends them as slices only while the core does not run.
+//! The core accesses a memory through a raw pointer while it runs. So a [`Memory`] owns its bytes through a raw
+//! pointer, too, and lends them as slices only while the core does not run.
 
 use core::fmt;
 use core::ptr::NonNull;
@@ -46,8 +46,8 @@ impl Memory {
         memory
     }
 
-    /// Returns the address of the memory on the host, for the core. While the core runs, no slice that another method has
-    /// returned may exist.
+    /// Returns the address of the memory on the host, for the core. While the core runs, no slice that another method
+    /// has returned may exist.
     pub fn host(&mut self) -> *mut u8 {
         self.start.as_ptr()
     }

@@ -100,9 +100,9 @@ pub struct Machine<C> {
 }
 
 impl<C: Circuit> Machine<C> {
-    /// The machine of `part` around `soc`, without power, at time 0, whose core has these costs and whose firmware
-    /// keeps its RTT control block at `rtt_block`. It goes on with what a core of an earlier machine has translated
-    /// unless it is to have a new one.
+    /// Returns the machine of `part` around `soc`, without power, at time 0, whose core has these costs and whose
+    /// firmware keeps its RTT control block at `rtt_block`. It goes on with what a core of an earlier machine has
+    /// translated unless it is to have a new one.
     ///
     /// # Panics
     ///
@@ -174,13 +174,13 @@ impl<C: Circuit> Machine<C> {
         }
     }
 
-    /// The virtual time.
+    /// Returns the virtual time.
     #[must_use]
     pub fn now(&self) -> Time {
         self.bus.clock.time(self.core.retired())
     }
 
-    /// Whether its core goes on with what it has translated for an earlier machine.
+    /// Returns whether its core goes on with what it has translated for an earlier machine.
     #[must_use]
     pub fn core_is_used(&self) -> bool {
         self.core_is_used
@@ -192,13 +192,13 @@ impl<C: Circuit> Machine<C> {
         self.counted + self.core.retired()
     }
 
-    /// Cycles of HCLK since the machine was made.
+    /// Returns the cycles of HCLK since the machine was made.
     #[must_use]
     pub fn cycles(&self) -> u64 {
         self.bus.clock.cycle(self.core.retired())
     }
 
-    /// How the core has spent the time since the machine was made.
+    /// Returns how the core has spent the time since the machine was made.
     #[must_use]
     pub fn core_time(&self) -> CoreTime {
         self.resting.of(self.now())
@@ -224,7 +224,7 @@ impl<C: Circuit> Machine<C> {
         }
     }
 
-    /// How long exception `number` had to wait, as measured.
+    /// Returns how long exception `number` had to wait, as measured.
     #[must_use]
     pub fn wait(&self, number: usize) -> Wait {
         self.bus
@@ -233,25 +233,25 @@ impl<C: Circuit> Machine<C> {
             .map_or_else(Wait::default, |waits| waits.of(number))
     }
 
-    /// The address of the next instruction.
+    /// Returns the address of the next instruction.
     #[must_use]
     pub fn pc(&self) -> u32 {
         self.core.pc() as u32
     }
 
-    /// Whether the power is on.
+    /// Returns whether the power is on.
     #[must_use]
     pub fn powered(&self) -> bool {
         self.powered
     }
 
-    /// Whether the core has locked up.
+    /// Returns whether the core has locked up.
     #[must_use]
     pub fn locked_up(&self) -> bool {
         self.locked_up
     }
 
-    /// Whether the core waits for an interrupt or an event.
+    /// Returns whether the core waits for an interrupt or an event.
     #[must_use]
     pub fn asleep(&self) -> bool {
         self.core.waiting()
@@ -263,24 +263,24 @@ impl<C: Circuit> Machine<C> {
         self.resets
     }
 
-    /// How often the power came on.
+    /// Returns how often the power came on.
     #[must_use]
     pub fn power_ons(&self) -> u64 {
         self.power_ons
     }
 
-    /// What the firmware logged since the last call.
+    /// Returns what the firmware logged since the last call.
     pub fn take_log(&mut self) -> String {
         self.log.take(self.bus.ram.bytes())
     }
 
-    /// The SRAM.
+    /// Returns the SRAM.
     #[must_use]
     pub fn ram(&self) -> &[u8] {
         self.bus.ram.bytes()
     }
 
-    /// The SRAM, to change: a debugger's write.
+    /// Returns the SRAM, to change: a debugger's write.
     pub fn ram_mut(&mut self) -> &mut [u8] {
         let base = u64::from(RAM_BASE);
         self.core.ask(Queued::Invalidate(
@@ -290,14 +290,14 @@ impl<C: Circuit> Machine<C> {
         self.bus.ram.bytes_mut()
     }
 
-    /// The flash, to change: a programmer's write.
+    /// Returns the flash, to change: a programmer's write.
     pub fn flash_mut(&mut self) -> &mut [u8] {
         self.flash_range_mut(0..self.bus.part.flash_size)
             .unwrap_or_default()
     }
 
-    /// A part of the flash, to change; only the code in it is translated anew. `None` when it does not
-    /// all lie in flash.
+    /// Returns a part of the flash, to change; only the code in it is translated anew. `None` when it does not all lie
+    /// in flash.
     pub fn flash_range_mut(&mut self, range: core::ops::Range<usize>) -> Option<&mut [u8]> {
         if range.start > range.end || range.end > self.bus.part.flash_size {
             return None;
@@ -308,7 +308,7 @@ impl<C: Circuit> Machine<C> {
         self.bus.soc.flash.bytes_mut().get_mut(range)
     }
 
-    /// A core register: 0 to 15, 16 xPSR, 17 MSP, 18 PSP, 19 PRIMASK, 20 BASEPRI, 21 FAULTMASK, 22 CONTROL.
+    /// Returns a core register: 0 to 15, 16 xPSR, 17 MSP, 18 PSP, 19 PRIMASK, 20 BASEPRI, 21 FAULTMASK, 22 CONTROL.
     #[must_use]
     pub fn register(&self, number: usize) -> Option<u32> {
         let bytes = self.core.gdb_register(number)?;

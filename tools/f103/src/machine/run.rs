@@ -52,7 +52,7 @@ pub struct Limit {
 }
 
 impl Limit {
-    /// At this instant only.
+    /// Returns a limit at this instant only.
     pub(crate) const fn until(time: Time) -> Self {
         Self {
             time,
@@ -196,7 +196,8 @@ impl<C: Circuit> Machine<C> {
         true
     }
 
-    /// Returns why the core waits: after WFI or WFE, or in a branch to itself, which the emulated core treats as a wait.
+    /// Returns why the core waits: after WFI or WFE, or in a branch to itself, which the emulated core treats as a
+    /// wait.
     fn why_waiting(&self) -> Rest {
         const BRANCH: u16 = 0xE7FE;
         const WIDE_BRANCH: [u16; 2] = [0xF7FF, 0xBFFE];
@@ -272,8 +273,8 @@ impl<C: Circuit> Machine<C> {
         }
     }
 
-    /// Returns until when the core cannot execute an instruction, and why: no power, no clock, held in reset, locked up,
-    /// or stalled by the flash.
+    /// Returns until when the core cannot execute an instruction, and why: no power, no clock, held in reset, locked
+    /// up, or stalled by the flash.
     fn idle_end(&self, now: Time) -> Option<(Time, Rest)> {
         if !self.powered || self.locked_up || self.bus.soc.rcc.stopped() {
             return Some((Time::MAX, Rest::Off));
@@ -311,8 +312,8 @@ impl<C: Circuit> Machine<C> {
         }
     }
 
-    /// Enters the NMI's handler while its line is high, which it is until CSSC is written (RM0008 7.2.7). A handler that
-    /// returns without writing CSSC is entered again. The NMI also ends a lock-up in the hard fault handler.
+    /// Enters the NMI's handler while its line is high, which it is until CSSC is written (RM0008 7.2.7). A handler
+    /// that returns without writing CSSC is entered again. The NMI also ends a lock-up in the hard fault handler.
     fn serve_nmi(&mut self) {
         if !self.bus.soc.rcc.nmi() {
             return;

@@ -290,8 +290,8 @@ impl Segments {
         }
     }
 
-    /// Returns the segment that starts at `place`; `code` begins with its bytes. While `changes` has the same value, the
-    /// bytes are the same.
+    /// Returns the segment that starts at `place`; `code` begins with its bytes. While `changes` has the same value,
+    /// the bytes are the same.
     #[inline]
     pub fn at(&mut self, place: Place, code: &[u8], changes: Option<NonZero<u64>>) -> &Segment {
         let index = (place.start | u32::from(place.branched)) as usize % Self::PLACES;

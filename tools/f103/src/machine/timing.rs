@@ -38,7 +38,7 @@ pub struct InstructionClock {
 }
 
 impl InstructionClock {
-    /// A clock that starts at `at`, before the first instruction.
+    /// Returns a clock that starts at `at`, before the first instruction.
     #[must_use]
     pub fn new(at: Time, hclk: u32) -> Self {
         let mut clock = Self {
@@ -54,7 +54,7 @@ impl InstructionClock {
         clock
     }
 
-    /// Instant at which the `count`th instruction ends.
+    /// Returns the instant at which the `count`th instruction ends.
     #[inline]
     #[must_use]
     pub fn time(&self, count: u64) -> Time {
@@ -62,14 +62,14 @@ impl InstructionClock {
         at + Time::from_ps(self.hclk_cycle.times(self.cycle(count) - base))
     }
 
-    /// Cycle of HCLK in which the `count`th instruction ends.
+    /// Returns the cycle of HCLK in which the `count`th instruction ends.
     #[inline]
     #[must_use]
     pub fn cycle(&self, count: u64) -> u64 {
         self.cycle + self.segment.cycles(count - self.count)
     }
 
-    /// Instant at which cycle `cycle` of HCLK begins, at the present rate.
+    /// Returns the instant at which cycle `cycle` of HCLK begins, at the present rate.
     #[inline]
     #[must_use]
     pub fn time_of_cycle(&self, cycle: u64) -> Time {
@@ -88,7 +88,7 @@ impl InstructionClock {
         self.segment = *segment;
     }
 
-    /// Whether the instruction after the `count`th is in the present segment, at the address `pc`.
+    /// Returns whether the instruction after the `count`th is in the present segment, at the address `pc`.
     #[inline]
     #[must_use]
     pub fn goes_on(&self, count: u64, pc: u32) -> bool {
@@ -103,7 +103,8 @@ impl InstructionClock {
         (length > 0 && count - self.count >= length).then_some(&self.segment)
     }
 
-    /// The first cycle that ends at `until` or later, if time does not jump and the rate stays the same until then.
+    /// Returns the first cycle that ends at `until` or later, if time does not jump and the rate stays the same until
+    /// then.
     #[must_use]
     pub fn cycle_at(&self, until: Time) -> u64 {
         let (at, base) = self.at;
@@ -112,8 +113,8 @@ impl InstructionClock {
         })
     }
 
-    /// Number of instructions after the `count`th until one ends in cycle `last` or later: 0 if the `count`th does. The
-    /// number does not reach beyond the end of the present segment.
+    /// Returns the number of instructions after the `count`th until one ends in cycle `last` or later: 0 if the
+    /// `count`th does. The number does not reach beyond the end of the present segment.
     #[must_use]
     pub fn instructions_to(&self, count: u64, last: u64) -> u64 {
         let done = count - self.count;
@@ -121,7 +122,7 @@ impl InstructionClock {
         reached.saturating_sub(done)
     }
 
-    /// Number of instructions after the `count`th until one ends at `until` or later, as
+    /// Returns the number of instructions after the `count`th until one ends at `until` or later, as
     /// [`instructions_to`](Self::instructions_to).
     #[must_use]
     pub fn instructions_until(&self, count: u64, until: Time) -> u64 {
@@ -193,7 +194,7 @@ impl Ratio {
         }
     }
 
-    /// Duration of `n` periods: floor(n * num / den).
+    /// Returns the duration of `n` periods: floor(n * num / den).
     const fn times(self, n: u64) -> u64 {
         match n.checked_mul(self.num) {
             Some(product) => product / self.den,
@@ -201,7 +202,7 @@ impl Ratio {
         }
     }
 
-    /// The smallest n with `times(n) >= ps`: ceil(ps * den / num).
+    /// Returns the smallest n with `times(n) >= ps`: ceil(ps * den / num).
     fn least(self, ps: u64) -> u64 {
         match ps.checked_mul(self.den) {
             Some(product) => product.div_ceil(self.num),
@@ -212,7 +213,7 @@ impl Ratio {
         }
     }
 
-    /// The largest n with `times(n) <= ps`: one less than the smallest n above it.
+    /// Returns the largest n with `times(n) <= ps`: one less than the smallest n above it.
     fn whole(self, ps: u64) -> u64 {
         self.least(ps.saturating_add(1)) - 1
     }

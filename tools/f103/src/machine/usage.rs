@@ -16,7 +16,7 @@ pub struct CoreTime {
 }
 
 impl CoreTime {
-    /// The times since `earlier`, an earlier reading of the same board.
+    /// Returns the times since `earlier`, an earlier reading of the same board.
     #[must_use]
     pub fn since(self, earlier: Self) -> Self {
         Self {
@@ -27,8 +27,8 @@ impl CoreTime {
         }
     }
 
-    /// Load of the core, 0 to 1: the share of its time that it was not asleep, without the time that it was off. 0 if
-    /// it was always off.
+    /// Returns the load of the core, 0 to 1: the share of its time that it was not asleep, without the time that it was
+    /// off. 0 if it was always off.
     #[must_use]
     pub fn load(self) -> f64 {
         let awake = self.running + self.stalled;
@@ -68,7 +68,7 @@ impl Resting {
         }
     }
 
-    /// The times of the core up to `now`.
+    /// Returns the times of the core up to `now`.
     pub(super) fn of(self, now: Time) -> CoreTime {
         let CoreTime {
             stalled,

@@ -64,12 +64,12 @@ impl Waits {
         }
     }
 
-    /// The waits of exception `number` so far.
+    /// Returns the waits of exception `number` so far.
     pub(super) fn of(&self, number: usize) -> Wait {
         self.done.get(number).copied().unwrap_or_default()
     }
 
-    /// Address of the vector table whose page is passed to the bus.
+    /// Returns the address of the vector table whose page is passed to the bus.
     pub(super) fn table(&self) -> Option<u32> {
         self.table
     }

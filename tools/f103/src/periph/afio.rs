@@ -19,7 +19,7 @@ pub struct Afio {
 }
 
 impl Afio {
-    /// The port that feeds EXTI line `line` (0 to 15): 0 = A, 1 = B, ...
+    /// Returns the port that feeds EXTI line `line` (0 to 15): 0 = A, 1 = B, ...
     #[must_use]
     pub fn exti_port(&self, line: usize) -> usize {
         (self.exticr[line / 4] >> (4 * (line % 4)) & 0xF) as usize

@@ -75,7 +75,7 @@ impl Clocks {
         adc: 0,
     };
 
-    /// The clocks with `cfgr` in RCC_CFGR and `sws` as the clock in use (0 HSI, 1 HSE, 2 PLL).
+    /// Returns the clocks with `cfgr` in RCC_CFGR and `sws` as the clock in use (0 HSI, 1 HSE, 2 PLL).
     #[must_use]
     pub const fn of(cfgr: u32, sws: u32, oscillators: &Oscillators) -> Self {
         let sysclk = match sws {

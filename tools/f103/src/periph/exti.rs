@@ -26,13 +26,13 @@ impl Exti {
         self.pr |= changed & (level & self.rtsr | !level & self.ftsr);
     }
 
-    /// Whether any line detects edges.
+    /// Returns whether any line detects edges.
     #[must_use]
     pub fn listens(&self) -> bool {
         self.rtsr | self.ftsr != 0
     }
 
-    /// The lines that request an interrupt, one bit each.
+    /// Returns the lines that request an interrupt, one bit each.
     #[must_use]
     pub fn requests(&self) -> u32 {
         self.pr & self.imr

@@ -32,7 +32,7 @@ impl Ident {
         Self { bytes }
     }
 
-    /// The word at `offset` from [`BASE`] (word aligned, below [`SIZE`]).
+    /// Returns the word at `offset` from [`BASE`] (word aligned, below [`SIZE`]).
     #[must_use]
     pub fn read(&self, offset: u32) -> u32 {
         let at = offset as usize;

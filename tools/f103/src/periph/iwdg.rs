@@ -66,7 +66,7 @@ impl Default for Iwdg {
 }
 
 impl Iwdg {
-    /// A watchdog that has not been started, on an LSI of `hz` Hz.
+    /// Returns a watchdog that has not been started, on an LSI of `hz` Hz.
     #[must_use]
     pub fn new(hz: u32) -> Self {
         Self {
@@ -81,7 +81,7 @@ impl Iwdg {
         }
     }
 
-    /// Whether it has been started.
+    /// Returns whether it has been started.
     #[must_use]
     pub fn running(&self) -> bool {
         self.started
@@ -100,12 +100,12 @@ impl Iwdg {
         }
     }
 
-    /// Whether the watchdog has requested a reset since the last call.
+    /// Returns whether the watchdog has requested a reset since the last call.
     pub fn take_reset_request(&mut self) -> bool {
         core::mem::take(&mut self.reset_requested)
     }
 
-    /// Time from a reload to the reset (RM0008 table 96).
+    /// Returns the time from a reload to the reset (RM0008 table 96).
     fn timeout(&self) -> Time {
         // PR 0 to 6 divide by 4 to 256; 7 also divides by 256.
         let divider = 4u64 << self.prescaler.in_force.min(6);

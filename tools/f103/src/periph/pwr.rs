@@ -45,7 +45,7 @@ impl Default for Pwr {
 }
 
 impl Pwr {
-    /// The supply, in millivolts.
+    /// Returns the supply, in millivolts.
     #[must_use]
     pub const fn supply_mv(&self) -> u16 {
         self.supply_mv

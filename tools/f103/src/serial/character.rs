@@ -17,8 +17,8 @@ pub struct Character {
 }
 
 impl Character {
-    /// A character of `byte` in the format and at the rate of `settings`, starting at time 0. With seven data bits the
-    /// highest bit of `byte` is not sent.
+    /// Returns a character of `byte` in the format and at the rate of `settings`, starting at time 0. With seven data
+    /// bits the highest bit of `byte` is not sent.
     #[must_use]
     pub fn new(settings: Settings, byte: u8) -> Self {
         let data_bits = settings.format.data_bits();
@@ -40,7 +40,8 @@ impl Character {
         }
     }
 
-    /// A character of the low `data_bits` bits of `data`, LSB first, with `stop_bits` stop bits and without parity.
+    /// Returns a character of the low `data_bits` bits of `data`, LSB first, with `stop_bits` stop bits and without
+    /// parity.
     #[must_use]
     pub fn raw(start: Time, rate: Rate, data: u16, data_bits: u8, stop_bits: u8) -> Self {
         let bits = 1 + data_bits + stop_bits;
@@ -53,8 +54,8 @@ impl Character {
         }
     }
 
-    /// A break at time 0: low for `low_bits` bits, then one stop bit. A break has 10 to 15 low bits; more than 15 count
-    /// as 15.
+    /// Returns a break at time 0: low for `low_bits` bits, then one stop bit. A break has 10 to 15 low bits; more than
+    /// 15 count as 15.
     #[must_use]
     pub fn line_break(rate: Rate, low_bits: u8) -> Self {
         let low_bits = low_bits.min(15);
@@ -66,8 +67,8 @@ impl Character {
         }
     }
 
-    /// The same character with bit `n` inverted: 0 is the start bit, 1 the lowest data bit. Nothing changes if the
-    /// character has no bit `n`.
+    /// Returns the same character with bit `n` inverted: 0 is the start bit, 1 the lowest data bit. Nothing changes if
+    /// the character has no bit `n`.
     #[must_use]
     pub const fn with_bit_flipped(mut self, n: u8) -> Self {
         if n < self.bits {
@@ -76,14 +77,15 @@ impl Character {
         self
     }
 
-    /// The same character with an inverted parity bit, which is the bit before the only stop bit. The format must have
-    /// a parity bit.
+    /// Returns the same character with an inverted parity bit, which is the bit before the only stop bit. The format
+    /// must have a parity bit.
     #[must_use]
     pub const fn with_wrong_parity(self) -> Self {
         self.with_bit_flipped(self.bits - 2)
     }
 
-    /// The same character with a low first stop bit: a framing error. `settings` must be those of the character.
+    /// Returns the same character with a low first stop bit: a framing error. `settings` must be those of the
+    /// character.
     #[must_use]
     pub const fn with_bad_stop(mut self, settings: Settings) -> Self {
         let first_stop = self.bits - settings.format.stop_bits();
@@ -91,27 +93,27 @@ impl Character {
         self
     }
 
-    /// The same character, starting at `start`.
+    /// Returns the same character, starting at `start`.
     #[must_use]
     pub const fn at(mut self, start: Time) -> Self {
         self.start = start;
         self
     }
 
-    /// End of the last stop bit.
+    /// Returns the end of the last stop bit.
     #[must_use]
     pub fn end(&self) -> Time {
         self.start + self.bit * u64::from(self.bits)
     }
 
-    /// Level during bit `n`; high after the last bit.
+    /// Returns the level during bit `n`; high after the last bit.
     #[must_use]
     pub const fn level(&self, n: u8) -> bool {
         n >= self.bits || self.levels >> n & 1 == 1
     }
 }
 
-/// A mask with ones from bit `from` up to, not including, bit `to`.
+/// Returns a mask with ones from bit `from` up to, not including, bit `to`.
 const fn ones(from: u8, to: u8) -> u16 {
     let mut mask = 0;
     let mut bit = from;

@@ -12,7 +12,7 @@ pub enum Parity {
 }
 
 impl Parity {
-    /// The parity bit that belongs to `data`.
+    /// Returns the parity bit that belongs to `data`.
     #[must_use]
     pub const fn bit(self, data: u16) -> bool {
         let odd = data.count_ones() % 2 == 1;
@@ -55,13 +55,13 @@ impl Format {
         Self::SevenN2,
     ];
 
-    /// The format with this [`name`](Self::name).
+    /// Returns the format with this [`name`](Self::name).
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|format| format.name() == name)
     }
 
-    /// Number of data bits: 7 or 8.
+    /// Returns the number of data bits: 7 or 8.
     #[must_use]
     pub const fn data_bits(self) -> u8 {
         match self {
@@ -70,7 +70,7 @@ impl Format {
         }
     }
 
-    /// The parity; `None` for a format without a parity bit.
+    /// Returns the parity; `None` for a format without a parity bit.
     #[must_use]
     pub const fn parity(self) -> Option<Parity> {
         match self {
@@ -80,7 +80,7 @@ impl Format {
         }
     }
 
-    /// Number of stop bits: 1 or 2.
+    /// Returns the number of stop bits: 1 or 2.
     #[must_use]
     pub const fn stop_bits(self) -> u8 {
         match self {
@@ -89,13 +89,13 @@ impl Format {
         }
     }
 
-    /// Number of bits in a character, with the start and stop bits: 10 or 11.
+    /// Returns the number of bits in a character, with the start and stop bits: 10 or 11.
     #[must_use]
     pub const fn bits(self) -> u8 {
         1 + self.data_bits() + self.parity().is_some() as u8 + self.stop_bits()
     }
 
-    /// The usual name, such as `8N2`.
+    /// Returns the usual name, such as `8N2`.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -119,7 +119,7 @@ pub struct Rate {
 }
 
 impl Rate {
-    /// A rate of `baud` bits per second.
+    /// Returns a rate of `baud` bits per second.
     #[must_use]
     pub const fn from_baud(baud: u32) -> Self {
         Self {
@@ -128,20 +128,20 @@ impl Rate {
         }
     }
 
-    /// A rate of one bit in `cycles` cycles of a clock of `hz` Hz, at most 268 MHz.
+    /// Returns a rate of one bit in `cycles` cycles of a clock of `hz` Hz, at most 268 MHz.
     #[must_use]
     pub const fn from_clock(cycles: u32, hz: u32) -> Self {
         Self { cycles, hz }
     }
 
-    /// Duration of `n` bits.
+    /// Returns the duration of `n` bits.
     #[must_use]
     pub fn bits(self, n: u64) -> Time {
         Time::cycles(n * u64::from(self.cycles), self.hz)
     }
 
-    /// Number and time of the first tick at `span` or later, of a clock that ticks `parts` times in a bit. Ticks and
-    /// time count from the start of the clock.
+    /// Returns the number and time of the first tick at `span` or later, of a clock that ticks `parts` times in a bit.
+    /// Ticks and time count from the start of the clock.
     #[must_use]
     pub fn ticks(self, parts: u32, span: Time) -> (u64, Time) {
         let hz = self.hz.saturating_mul(parts);
@@ -154,7 +154,7 @@ impl Rate {
         (tick, at(tick))
     }
 
-    /// Duration of `n` sixteenths of a bit, which is the period of a receiver's sampling clock.
+    /// Returns the duration of `n` sixteenths of a bit, which is the period of a receiver's sampling clock.
     #[must_use]
     pub fn sixteenths(self, n: u64) -> Time {
         Time::cycles(n * u64::from(self.cycles), self.hz.saturating_mul(16))
@@ -181,13 +181,13 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// The bit rate.
+    /// Returns the bit rate.
     #[must_use]
     pub const fn rate(self) -> Rate {
         Rate::from_baud(self.baud)
     }
 
-    /// Duration of `n` characters without gaps.
+    /// Returns the duration of `n` characters without gaps.
     #[must_use]
     pub fn characters(self, n: u64) -> Time {
         self.rate().bits(n * u64::from(self.format.bits()))

@@ -14,14 +14,14 @@ pub struct Wave {
 }
 
 impl Default for Wave {
-    /// A wire that has always been high.
+    /// Returns a wire that has always been high.
     fn default() -> Self {
         Self::new(true)
     }
 }
 
 impl Wave {
-    /// A wire that has always been at `level`.
+    /// Returns a wire that has always been at `level`.
     #[must_use]
     pub const fn new(level: bool) -> Self {
         Self {
@@ -63,7 +63,7 @@ impl Wave {
         }
     }
 
-    /// Level at `at`. At the instant of an edge this is the level after the edge.
+    /// Returns the level at `at`. At the instant of an edge this is the level after the edge.
     #[must_use]
     pub fn level_at(&self, at: Time) -> bool {
         match self.index_after(at) {
@@ -72,13 +72,13 @@ impl Wave {
         }
     }
 
-    /// Level after the last edge.
+    /// Returns the level after the last edge.
     #[must_use]
     pub fn last_level(&self) -> bool {
         self.edges.back().map_or(self.before, |&(_, level)| level)
     }
 
-    /// The edges after `from`, up to and including `to`.
+    /// Returns the edges after `from`, up to and including `to`.
     pub fn edges(&self, from: Time, to: Time) -> impl Iterator<Item = (Time, bool)> + '_ {
         self.edges
             .range(self.index_after(from)..)
@@ -86,13 +86,13 @@ impl Wave {
             .take_while(move |&(t, _)| t <= to)
     }
 
-    /// The first edge after `from`.
+    /// Returns the first edge after `from`.
     #[must_use]
     pub fn next_edge(&self, from: Time) -> Option<(Time, bool)> {
         self.edges.get(self.index_after(from)).copied()
     }
 
-    /// The first falling edge after `from`.
+    /// Returns the first falling edge after `from`.
     #[must_use]
     pub fn next_fall(&self, from: Time) -> Option<Time> {
         self.edges(from, Time::MAX)
@@ -100,7 +100,7 @@ impl Wave {
             .map(|(t, _)| t)
     }
 
-    /// Time of the last edge before `edge`; `None` if no such edge is kept.
+    /// Returns the time of the last edge before `edge`; `None` if no such edge is kept.
     #[must_use]
     pub fn previous_edge(&self, edge: Time) -> Option<Time> {
         if let last @ Some(at) = self.last_edge()
@@ -112,30 +112,30 @@ impl Wave {
         n.checked_sub(1).map(|n| self.edges[n].0)
     }
 
-    /// Whether the wire was low at any instant from `from` up to `to`.
+    /// Returns whether the wire was low at any instant from `from` up to `to`.
     #[must_use]
     pub fn low_between(&self, from: Time, to: Time) -> bool {
         !self.level_at(from) || self.edges(from, to).any(|(_, level)| !level)
     }
 
-    /// Number of edges that are kept.
+    /// Returns the number of edges that are kept.
     #[must_use]
     pub fn len(&self) -> usize {
         self.edges.len()
     }
 
-    /// Whether no edges are kept.
+    /// Returns whether no edges are kept.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.edges.is_empty()
     }
 
-    /// Time of the last edge.
+    /// Returns the time of the last edge.
     fn last_edge(&self) -> Option<Time> {
         self.edges.back().map(|&(at, _)| at)
     }
 
-    /// Number of edges up to and including `at`.
+    /// Returns the number of edges up to and including `at`.
     fn index_after(&self, at: Time) -> usize {
         // The usual case: `at` is the present, and the wire has no edges in the future.
         if self.last_edge().is_none_or(|last| last <= at) {

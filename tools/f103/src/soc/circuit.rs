@@ -18,7 +18,7 @@ pub struct Pin {
 }
 
 impl Pin {
-    /// Pin `number` (0 to 15) of a port (`'A'` to `'D'`).
+    /// Returns the pin `number` (0 to 15) of a port (`'A'` to `'D'`).
     ///
     /// # Panics
     ///
@@ -31,7 +31,7 @@ impl Pin {
         }
     }
 
-    /// Pin `number` (0 to 15) of a port (`'A'` to `'D'`, or in lower case). `None` if there is no such pin.
+    /// Returns the pin `number` (0 to 15) of a port (`'A'` to `'D'`, or in lower case). `None` if there is no such pin.
     #[must_use]
     pub const fn find(port: char, number: usize) -> Option<Self> {
         let port = (port.to_ascii_uppercase() as usize).wrapping_sub('A' as usize);
@@ -42,24 +42,24 @@ impl Pin {
         }
     }
 
-    /// Port of the pin, `'A'` to `'D'`.
+    /// Returns the port of the pin, `'A'` to `'D'`.
     #[must_use]
     pub const fn port(self) -> char {
         (b'A' + self.port as u8) as char
     }
 
-    /// Port of the pin as a number: 0 is port A.
+    /// Returns the port of the pin as a number: 0 is port A.
     pub(crate) const fn port_index(self) -> usize {
         self.port
     }
 
-    /// Number of the pin in its port, 0 to 15.
+    /// Returns the number of the pin in its port, 0 to 15.
     #[must_use]
     pub const fn number(self) -> usize {
         self.number
     }
 
-    /// Number of the ADC1 input at this pin (DS5319 table 5); `None` if the pin is not an analog input.
+    /// Returns the number of the ADC1 input at this pin (DS5319 table 5); `None` if the pin is not an analog input.
     const fn analog_input(self) -> Option<usize> {
         match (self.port, self.number) {
             (0, 0..=7) => Some(self.number),
@@ -121,18 +121,18 @@ pub trait Circuit {
     /// Called when the supply of the circuit and the part is switched: at power-off before the part's outputs change.
     fn set_power(&mut self, _on: bool, _now: Time) {}
 
-    /// Whether the circuit drives its pins in another way than at the last call because time has passed. Called after a
-    /// device at a USART was computed; [`Circuit::drive`] is called then.
+    /// Returns whether the circuit drives its pins in another way than at the last call because time has passed. Called
+    /// after a device at a USART was computed; [`Circuit::drive`] is called then.
     fn pins_changed(&mut self) -> bool {
         false
     }
 
-    /// The device at the USART whose transmitter is at pin `tx`; `None` if nothing is connected.
+    /// Returns the device at the USART whose transmitter is at pin `tx`; `None` if nothing is connected.
     fn wire(&mut self, _tx: Pin) -> Option<&mut dyn Wire> {
         None
     }
 
-    /// The devices on the I2C bus whose clock is at pin `scl`; `None` if there are none.
+    /// Returns the devices on the I2C bus whose clock is at pin `scl`; `None` if there are none.
     fn i2c(&mut self, _scl: Pin) -> Option<&mut dyn Bus> {
         None
     }

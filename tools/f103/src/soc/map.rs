@@ -218,7 +218,7 @@ impl Block {
         }
     }
 
-    /// Name of the block in RM0008.
+    /// Returns the name of the block in RM0008.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {

@@ -90,13 +90,13 @@ pub struct Signals {
 }
 
 impl<C: Circuit> Soc<C> {
-    /// USART1.
+    /// Returns USART1.
     #[must_use]
     pub const fn usart1(&self) -> &Usart {
         &self.usart1
     }
 
-    /// The part after power-on, with this flash, in `circuit`.
+    /// Returns the part after power-on, with this flash, in `circuit`.
     #[must_use]
     pub fn new(config: &Config, flash: Flash, circuit: C) -> Self {
         let oscillators = config.corner.oscillators().with_crystal(config.crystal_hz);
@@ -208,13 +208,13 @@ impl<C: Circuit> Soc<C> {
         core::mem::take(&mut self.notes)
     }
 
-    /// Whether there are findings to take.
+    /// Returns whether there are findings to take.
     #[must_use]
     pub fn has_notes(&self) -> bool {
         !self.notes.is_empty()
     }
 
-    /// Instant of the next event of any block; [`Time::MAX`] if there is none.
+    /// Returns the instant of the next event of any block; [`Time::MAX`] if there is none.
     #[must_use]
     pub fn next_event(&self) -> Time {
         self.next
@@ -285,7 +285,7 @@ impl<C: Circuit> Soc<C> {
         answer
     }
 
-    /// Whether `block` has its clock (RM0008 7.3.7, 7.3.8).
+    /// Returns whether `block` has its clock (RM0008 7.3.7, 7.3.8).
     #[must_use]
     pub fn is_clocked(&self, block: Block) -> bool {
         let (apb2, apb1) = self.rcc.enabled();

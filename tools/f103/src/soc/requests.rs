@@ -15,7 +15,7 @@ impl<C: Circuit> Soc<C> {
         (core::mem::take(&mut self.changed_lines), self.levels)
     }
 
-    /// Whether an interrupt line has changed since [`take_lines`](Self::take_lines).
+    /// Returns whether an interrupt line has changed since [`take_lines`](Self::take_lines).
     #[must_use]
     pub fn lines_changed(&self) -> bool {
         self.changed_lines != 0

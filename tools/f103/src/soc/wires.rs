@@ -23,7 +23,7 @@ pub(super) struct Serial {
 }
 
 impl Serial {
-    /// Port of the USART's pins.
+    /// Returns the port of the USART's pins.
     pub(super) const fn port(&self) -> Block {
         GPIO[self.tx.port_index()]
     }
@@ -74,7 +74,7 @@ impl<C: Circuit> Soc<C> {
         }
     }
 
-    /// A USART and the device that is connected to it.
+    /// Returns a USART and the device that is connected to it.
     fn usart(&mut self, serial: &Serial) -> (&mut Usart, Option<&mut dyn Wire>) {
         let usart = match serial.usart {
             Block::Usart3 => &mut self.usart3,
@@ -102,7 +102,7 @@ impl<C: Circuit> Soc<C> {
         self.note_due(serial.usart);
     }
 
-    /// Instant of the next event in a USART or at its RX pin.
+    /// Returns the instant of the next event in a USART or at its RX pin.
     pub(super) fn next_exchange(&mut self, serial: &Serial) -> Option<Time> {
         match self.usart(serial) {
             (usart, Some(wire)) => usart.next_exchange(wire),
@@ -110,8 +110,8 @@ impl<C: Circuit> Soc<C> {
         }
     }
 
-    /// Passes a character that has begun on to the wire, and reports a USART whose receiver is on while its RX pin is not
-    /// an input.
+    /// Passes a character that has begun on to the wire, and reports a USART whose receiver is on while its RX pin is
+    /// not an input.
     fn wire_usart(&mut self, serial: &Serial, now: Time) {
         let port = &self.gpio[serial.rx.port_index()];
         let closed = (port.outputs() | port.analog()) >> serial.rx.number() & 1 != 0;

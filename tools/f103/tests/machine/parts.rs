@@ -171,8 +171,8 @@ fn registers_keep_the_bits_that_silicon_keeps() {
     check_kept(Asm::new(), &kept);
 }
 
-/// What two STM32F103 returned after reset (labwired-core, `stm32f1_mmio_diff.rs`, `f103_conformance.rs`). The clocks of
-/// the blocks after `None` have to be on.
+/// What two STM32F103 returned after reset (labwired-core, `stm32f1_mmio_diff.rs`, `f103_conformance.rs`). The clocks
+/// of the blocks after `None` have to be on.
 #[test]
 fn registers_have_the_reset_values_of_silicon() {
     let values = [

@@ -129,7 +129,7 @@ impl Default for Adc {
 }
 
 impl Adc {
-    /// A converter out of reset, without a clock, its pins at 0 V.
+    /// Returns a converter out of reset, without a clock, its pins at 0 V.
     #[must_use]
     pub fn new() -> Self {
         let mut levels = [0; CHANNELS];

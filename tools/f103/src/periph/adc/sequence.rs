@@ -22,13 +22,13 @@ impl Sequence {
         (self.sqr[0] >> 20 & 0xF) as usize + 1
     }
 
-    /// The channel of rank `rank`, from 0: SQ1 is the lowest of SQR3.
+    /// Returns the channel of rank `rank`, from 0: SQ1 is the lowest of SQR3.
     pub const fn channel(&self, rank: usize) -> usize {
         let register = self.sqr[2 - rank / 6];
         (register >> (5 * (rank % 6)) & 0x1F) as usize
     }
 
-    /// Sampling time of a channel, in half cycles.
+    /// Returns the sampling time of a channel, in half cycles.
     pub const fn sample_halves(&self, channel: usize) -> u64 {
         let code = if channel < 10 {
             self.smpr[1] >> (3 * channel)
@@ -38,7 +38,7 @@ impl Sequence {
         SAMPLE[(code & 7) as usize]
     }
 
-    /// Half cycles from the start of sampling to the result.
+    /// Returns the half cycles from the start of sampling to the result.
     pub const fn total_halves(&self, channel: usize) -> u64 {
         self.sample_halves(channel) + CONVERSION
     }
@@ -92,17 +92,17 @@ impl Run {
         self.sampled = None;
     }
 
-    /// Sampling time of the input, in seconds.
+    /// Returns the sampling time of the input, in seconds.
     pub fn sample_seconds(&self) -> f64 {
         self.sample as f64 / (2.0 * f64::from(self.hz))
     }
 
-    /// Instant at which the input is disconnected. The level at that instant is converted.
+    /// Returns the instant at which the input is disconnected. The level at that instant is converted.
     pub fn sample_end(&self) -> Time {
         self.at(self.halves + self.sample)
     }
 
-    /// Instant at which the result is available.
+    /// Returns the instant at which the result is available.
     pub fn end(&self) -> Time {
         self.at(self.halves + self.total)
     }

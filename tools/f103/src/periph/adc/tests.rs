@@ -18,7 +18,7 @@ fn settled() -> (Adc, Time) {
     (adc, Time::from_us(10))
 }
 
-/// A conversion of channel 0 with sampling time `code`, begun at `at`.
+/// Returns a conversion of channel 0 with sampling time `code`, begun at `at`.
 fn converted(adc: &mut Adc, code: u32, at: Time) -> u16 {
     write(adc, offset::SMPR2, code, at);
     adc.advance(at);

@@ -101,7 +101,7 @@ impl Cells {
         self.memory.bytes()
     }
 
-    /// The bytes, for changes from outside. Such a change leaves every cell steady, as a programmer does.
+    /// Returns the bytes, for changes from outside. Such a change leaves every cell steady, as a programmer does.
     pub(super) fn bytes_mut(&mut self) -> &mut [u8] {
         self.unsteady.clear();
         self.memory.bytes_mut()
@@ -123,17 +123,17 @@ impl Cells {
         bytes
     }
 
-    /// Whether there are unsteady cells among these bytes.
+    /// Returns whether there are unsteady cells among these bytes.
     pub(super) fn is_unsteady(&self, bytes: Range<usize>) -> bool {
         self.unsteady.range(bytes).next().is_some()
     }
 
-    /// The page that the byte at `offset` is in; `None` beyond the last one.
+    /// Returns the page that the byte at `offset` is in; `None` beyond the last one.
     pub(super) fn page_of(&self, offset: usize) -> Option<usize> {
         (offset < self.bytes().len()).then_some(offset / self.page)
     }
 
-    /// The bytes that `operation` changes: first and end.
+    /// Returns the bytes that `operation` changes: first and end.
     fn span(&self, operation: Operation) -> (usize, usize) {
         match operation {
             Operation::Program { at, .. } => (at, at + 2),

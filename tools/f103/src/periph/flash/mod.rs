@@ -148,7 +148,7 @@ impl Flash {
         }
     }
 
-    /// Host address of the cells, for the core ([`crate::machine::memory::Memory::host`]).
+    /// Returns the host address of the cells, for the core ([`crate::machine::memory::Memory::host`]).
     pub fn host(&mut self) -> *mut u8 {
         self.cells.host()
     }
@@ -163,31 +163,32 @@ impl Flash {
         self.cells.take_memory()
     }
 
-    /// The contents.
+    /// Returns the contents.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
         self.cells.bytes()
     }
 
-    /// The contents, for changes from outside.
+    /// Returns the contents, for changes from outside.
     pub fn bytes_mut(&mut self) -> &mut [u8] {
         self.changes = self.changes.saturating_add(1);
         self.cells.bytes_mut()
     }
 
-    /// Wait states of a fetch, and whether the prefetch buffer is on (FLASH_ACR).
+    /// Returns the wait states of a fetch, and whether the prefetch buffer is on (FLASH_ACR).
     #[must_use]
     pub fn access_control(&self) -> (u32, bool) {
         (self.acr & ACR_LATENCY, self.acr & ACR_PRFTBE != 0)
     }
 
-    /// The end of the operation under way.
+    /// Returns the end of the operation under way.
     #[must_use]
     pub fn busy_until(&self) -> Option<Time> {
         self.busy.map(|busy| busy.until)
     }
 
-    /// Instant until which a fetch from flash stalls. No fetch stalls while the prefetch buffer has instructions.
+    /// Returns the instant until which a fetch from flash stalls. No fetch stalls while the prefetch buffer has
+    /// instructions.
     #[must_use]
     pub fn stalled_until(&self) -> Option<Time> {
         self.busy_until().filter(|_| self.ahead == 0)
@@ -205,7 +206,7 @@ impl Flash {
         self.without_eop = Some(self.started + nth.max(1));
     }
 
-    /// When the operation under way began and ends.
+    /// Returns the begin and the end of the operation under way.
     #[must_use]
     pub fn busy_span(&self) -> Option<(Time, Time)> {
         self.busy.map(|busy| (busy.from, busy.until))
@@ -228,7 +229,7 @@ impl Flash {
         u32::from_le_bytes(self.cells.read(at))
     }
 
-    /// Whether there are unsteady cells among these bytes. The core reads bytes without such cells directly.
+    /// Returns whether there are unsteady cells among these bytes. The core reads bytes without such cells directly.
     #[must_use]
     pub fn is_unsteady(&self, bytes: core::ops::Range<usize>) -> bool {
         self.cells.is_unsteady(bytes)
@@ -239,7 +240,7 @@ impl Flash {
         self.complaint.take()
     }
 
-    /// The bytes (first, end) that an operation changed since the last call.
+    /// Returns the bytes (first, end) that an operation changed since the last call.
     pub fn take_changed(&mut self) -> Option<(usize, usize)> {
         self.changed.take()
     }

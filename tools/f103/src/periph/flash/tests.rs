@@ -133,7 +133,7 @@ fn a_torn_erase_is_between_old_and_new_and_grows() {
     assert_eq!(early, torn_at(6), "the same every time");
 }
 
-/// The half-word at 0 after a program of 0 that was cut when half of it was done.
+/// Returns the half-word at 0 after a program of 0 that was cut when half of it was done.
 fn torn_half(seed: u64) -> Flash {
     let mut flash = Flash::new(&STM32F103CB, u32::MAX, seed);
     for key in KEYS {

@@ -97,7 +97,7 @@ impl Gpio {
         }
     }
 
-    /// Whether a pin that has to be slow is an output at 10 or 50 MHz.
+    /// Returns whether a pin that has to be slow is an output at 10 or 50 MHz.
     fn is_too_fast(&self) -> bool {
         (0..16).filter(|pin| self.slow >> pin & 1 != 0).any(|pin| {
             let register = if pin < 8 { self.crl } else { self.crh };
@@ -105,37 +105,37 @@ impl Gpio {
         })
     }
 
-    /// The levels at the pins, as a logic probe shows them, one bit each.
+    /// Returns the levels at the pins, as a logic probe shows them, one bit each.
     #[must_use]
     pub fn level(&self) -> u16 {
         self.level
     }
 
-    /// The pins that are outputs, one bit each.
+    /// Returns the pins that are outputs, one bit each.
     #[must_use]
     pub fn outputs(&self) -> u16 {
         self.modes.output
     }
 
-    /// The pins handed to a peripheral's output (alternate function), one bit each.
+    /// Returns the pins handed to a peripheral's output (alternate function), one bit each.
     #[must_use]
     pub fn alternate_outputs(&self) -> u16 {
         self.modes.alternate & self.modes.output
     }
 
-    /// The pins handed to a peripheral's output as open drain, one bit each.
+    /// Returns the pins handed to a peripheral's output as open drain, one bit each.
     #[must_use]
     pub fn alternate_open_drains(&self) -> u16 {
         self.alternate_outputs() & self.modes.open_drain
     }
 
-    /// The pins that the firmware itself pulls low as plain outputs, one bit each.
+    /// Returns the pins that the firmware itself pulls low as plain outputs, one bit each.
     #[must_use]
     pub fn pulled_low(&self) -> u16 {
         self.modes.output & !self.modes.alternate & !self.odr
     }
 
-    /// The level the part itself gives `pin`, as an output or by a pull; `None` when it leaves the pin open.
+    /// Returns the level the part itself gives `pin`, as an output or by a pull; `None` when it leaves the pin open.
     #[must_use]
     pub fn held(&self, pin: usize) -> Option<bool> {
         let bit = 1 << pin;
@@ -145,13 +145,13 @@ impl Gpio {
         held.then_some(high)
     }
 
-    /// The pins in analog mode, one bit each.
+    /// Returns the pins in analog mode, one bit each.
     #[must_use]
     pub fn analog(&self) -> u16 {
         self.modes.analog
     }
 
-    /// The voltage at a pin, in millivolts.
+    /// Returns the voltage at a pin, in millivolts.
     #[must_use]
     pub fn millivolts(&self, pin: usize) -> u16 {
         match self.drives[pin] {
@@ -161,7 +161,7 @@ impl Gpio {
         }
     }
 
-    /// Pins that the part and the outside drive against each other, since the last call.
+    /// Returns the pins that the part and the outside drive against each other, since the last call.
     pub fn take_contention(&mut self) -> u16 {
         core::mem::take(&mut self.contention)
     }
@@ -193,7 +193,7 @@ impl Gpio {
         self.watched |= 1 << pin;
     }
 
-    /// The recorded edges of `pin` (0 to 15).
+    /// Returns the recorded edges of `pin` (0 to 15).
     #[must_use]
     pub fn edges(&self, pin: usize) -> &[(Time, bool)] {
         &self.edges[pin]
@@ -258,7 +258,7 @@ impl Gpio {
         self.modes = modes;
     }
 
-    /// The bits of CRL (`first` = 0) or CRH (8) that LCKR has frozen.
+    /// Returns the bits of CRL (`first` = 0) or CRH (8) that LCKR has frozen.
     fn locked(&self, first: u32) -> u32 {
         if self.lckr & LCKK == 0 {
             return 0;

@@ -45,18 +45,18 @@ impl Bus for NoDevice {
 
 /// The devices on a bus, all of them together.
 pub trait Bus {
-    /// What the devices do to the wires, and what the firmware does when it drives the pins itself.
+    /// Returns what the devices do to the wires, and what the firmware does when it drives the pins itself.
     fn wires(&self) -> Wires;
 
-    /// A start condition and an address byte (bit 0 = read) were received. Returns whether a device acknowledges.
+    /// Takes a start condition and an address byte (bit 0 = read). Returns whether a device acknowledges.
     fn address(&mut self, byte: u8, now: Time) -> bool;
 
-    /// A data byte was received from the master. Returns whether it is acknowledged.
+    /// Takes a data byte from the master. Returns whether it is acknowledged.
     fn write(&mut self, byte: u8, now: Time) -> bool;
 
     /// Returns the next byte for the master: 0xFF when no device drives the wire.
     fn read(&mut self, now: Time) -> u8;
 
-    /// A stop condition.
+    /// Takes a stop condition.
     fn stop(&mut self, now: Time);
 }

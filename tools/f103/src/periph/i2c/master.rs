@@ -55,7 +55,7 @@ impl I2c {
         self.begin(now);
     }
 
-    /// Whether a held wire delays the end of the current state, or pins that are not in alternate open drain.
+    /// Returns whether a held wire delays the end of the current state, or pins that are not in alternate open drain.
     fn stretched_by_others(&self) -> bool {
         !self.connected
             || !self.wires.scl

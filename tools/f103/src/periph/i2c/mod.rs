@@ -135,7 +135,7 @@ impl I2c {
         in_byte
     }
 
-    /// The event interrupt, I2C1_EV (26.4, table 189).
+    /// Returns the event interrupt, I2C1_EV (26.4, table 189).
     #[must_use]
     pub const fn irq_event(&self) -> bool {
         self.cr2 & cr2::ITEVTEN != 0
@@ -143,13 +143,13 @@ impl I2c {
                 || self.cr2 & cr2::ITBUFEN != 0 && self.sr1 & sr1::BUFFER != 0)
     }
 
-    /// The error interrupt, I2C1_ER.
+    /// Returns the error interrupt, I2C1_ER.
     #[must_use]
     pub const fn irq_error(&self) -> bool {
         self.cr2 & cr2::ITERREN != 0 && self.sr1 & sr1::ERRORS != 0
     }
 
-    /// PCLK1 cycles of one SCL period (26.6.8).
+    /// Returns the PCLK1 cycles of one SCL period (26.6.8).
     fn bit_cycles(&self) -> u64 {
         let factor = match self.ccr & (ccr::FAST | ccr::DUTY) {
             0 | ccr::DUTY => 2,
@@ -159,7 +159,7 @@ impl I2c {
         u64::from(self.ccr & ccr::CCR) * factor
     }
 
-    /// Duration of `n` bits.
+    /// Returns the duration of `n` bits.
     fn bits(&self, n: u64) -> Time {
         Time::cycles(n * self.bit_cycles(), self.hz)
     }

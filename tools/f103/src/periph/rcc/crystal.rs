@@ -11,7 +11,7 @@ use super::{CFGR_SW, CR_CSSON, CR_HSEON, CR_HSION, CR_PLLON, Rcc};
 use crate::time::Time;
 
 impl Rcc {
-    /// Whether the crystal works.
+    /// Returns whether the crystal works.
     #[must_use]
     pub fn crystal(&self) -> bool {
         self.crystal
@@ -35,19 +35,19 @@ impl Rcc {
         self.changes.clocks = true;
     }
 
-    /// Whether the clock security system holds the NMI.
+    /// Returns whether the clock security system holds the NMI.
     #[must_use]
     pub fn nmi(&self) -> bool {
         self.failed
     }
 
-    /// Whether SYSCLK's source has failed without a replacement.
+    /// Returns whether SYSCLK's source has failed without a replacement.
     #[must_use]
     pub fn stopped(&self) -> bool {
         !self.is_ready(self.source(self.sws))
     }
 
-    /// Instant at which an HSE that is switched on now is ready.
+    /// Returns the instant at which an HSE that is switched on now is ready.
     pub(super) fn hse_start(&self, now: Time) -> Time {
         if self.crystal {
             now + self.oscillators.hse_start

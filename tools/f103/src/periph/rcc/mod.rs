@@ -116,7 +116,7 @@ pub struct Rcc {
 }
 
 impl Rcc {
-    /// The oscillators.
+    /// Returns the oscillators.
     #[must_use]
     pub fn oscillators(&self) -> Oscillators {
         self.oscillators
@@ -173,36 +173,36 @@ impl Rcc {
         self.lsi.get_or_insert(now + LSI_START);
     }
 
-    /// Instant from which the LSI runs, which may be in the future; `None` while it is off.
+    /// Returns the instant from which the LSI runs, which may be in the future; `None` while it is off.
     #[must_use]
     pub const fn lsi(&self) -> Option<Time> {
         self.lsi
     }
 
-    /// Whether the HSI runs: flash is programmed and erased by its clock (PM0075 2.3).
+    /// Returns whether the HSI runs: flash is programmed and erased by its clock (PM0075 2.3).
     #[must_use]
     pub fn hsi_on(&self) -> bool {
         self.hsi.is_some()
     }
 
-    /// The clock enables of APB2 and APB1.
+    /// Returns the clock enables of APB2 and APB1.
     #[must_use]
     pub fn enabled(&self) -> (u32, u32) {
         self.enr
     }
 
-    /// The resets that RSTR holds, of APB2 and APB1.
+    /// Returns the resets that RSTR holds, of APB2 and APB1.
     #[must_use]
     pub fn held_in_reset(&self) -> (u32, u32) {
         self.rstr
     }
 
-    /// The changes since the last call.
+    /// Returns the changes since the last call.
     pub fn take_changes(&mut self) -> Changes {
         core::mem::take(&mut self.changes)
     }
 
-    /// The frequencies of every clock.
+    /// Returns the frequencies of every clock.
     #[must_use]
     pub fn clocks(&self) -> Clocks {
         if self.stopped() {
@@ -215,7 +215,7 @@ impl Rcc {
         source.is_some_and(|at| at <= self.now)
     }
 
-    /// The source that SW selects.
+    /// Returns the source that SW selects.
     fn wanted(&self) -> Ready {
         self.source(self.cfgr & CFGR_SW)
     }
@@ -237,7 +237,7 @@ impl Rcc {
         }
     }
 
-    /// Whether the system clock runs from the HSE, directly or through the PLL.
+    /// Returns whether the system clock runs from the HSE, directly or through the PLL.
     fn hse_in_use(&self) -> bool {
         self.sws == 1 || (self.sws == 2 && self.pll_from_hse())
     }
@@ -255,7 +255,7 @@ impl Rcc {
             | if self.pll_is_ready() { CR_PLLRDY } else { 0 }
     }
 
-    /// PLLRDY.
+    /// Returns PLLRDY.
     fn pll_is_ready(&self) -> bool {
         self.is_ready(self.pll) || self.pll.is_none() && self.now < self.pll_stops
     }
@@ -287,7 +287,7 @@ impl Rcc {
         self.cr = cr;
     }
 
-    /// Instant at which a PLL that is switched on now locks; its source has to run first.
+    /// Returns the instant at which a PLL that is switched on now locks; its source has to run first.
     fn pll_lock(&self, now: Time) -> Time {
         let source = if self.pll_from_hse() {
             self.hse

@@ -7,15 +7,15 @@ use crate::peripheral::Unmodelled;
 use crate::time::Time;
 
 impl Timer {
-    /// Whether an edge at the input of `channel` (1 to 4) can raise an interrupt now. Only then must edges be passed
-    /// on immediately.
+    /// Returns whether an edge at the input of `channel` (1 to 4) can raise an interrupt now. Only then must edges be
+    /// passed on immediately.
     #[must_use]
     pub fn capture_interrupt_enabled(&self, channel: usize) -> bool {
         let n = channel - 1;
         self.captures(n) && self.dier & compare(n) != 0
     }
 
-    /// An edge at the input pin of `channel` (1 to 4) at `at`. Edges come in order and before any access or
+    /// Takes an edge at the input pin of `channel` (1 to 4) at `at`. Edges come in order and before any access or
     /// [`Peripheral::advance`](crate::peripheral::Peripheral::advance) to a later instant; then the captured count is
     /// exact.
     pub fn capture_edge(&mut self, channel: usize, at: Time, rising: bool) {
@@ -27,12 +27,12 @@ impl Timer {
         }
     }
 
-    /// Whether channel `n` (from 0) captures its own input: CCxS = 01 and CCxE.
+    /// Returns whether channel `n` (from 0) captures its own input: CCxS = 01 and CCxE.
     fn captures(&self, n: usize) -> bool {
         self.selection(n) == 1 && self.ccer >> (4 * n) & 1 == 1
     }
 
-    /// The half of CCMR that belongs to channel `n` (from 0).
+    /// Returns the half of CCMR that belongs to channel `n` (from 0).
     pub(super) fn mode(&self, n: usize) -> u32 {
         self.ccmr[n / 2] >> (8 * (n % 2)) & 0xFF
     }
@@ -93,7 +93,7 @@ impl Timer {
         finding.and_then(|()| self.check_outputs())
     }
 
-    /// A finding when a compare output is enabled that is not frozen: the pin would move.
+    /// Returns a finding when a compare output is enabled that is not frozen: the pin would move.
     pub(super) fn check_outputs(&self) -> Result<(), Unmodelled> {
         let enabled = |n: usize| self.ccer >> (4 * n) & 5 != 0;
         let moves = |n: usize| self.selection(n) == 0 && self.mode(n) >> 4 & 7 != 0;

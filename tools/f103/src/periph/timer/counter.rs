@@ -9,7 +9,7 @@ use crate::time::Time;
 /// The update flag, UIF, as [`Counter::run`] reports it; the compare flags CC1IF to CC4IF follow it.
 pub const UPDATE: u32 = 1;
 
-/// The compare flag of channel `n`, 0 to 3.
+/// Returns the compare flag of channel `n`, 0 to 3.
 pub const fn compare(n: usize) -> u32 {
     2 << n
 }
@@ -81,7 +81,7 @@ impl Counter {
         }
     }
 
-    /// CNT.
+    /// Returns CNT.
     pub const fn count(&self) -> u32 {
         self.count
     }
@@ -136,7 +136,8 @@ impl Counter {
         flags
     }
 
-    /// When one of the `wanted` flags may rise next. At that instant it rises, or the instant has to be computed again.
+    /// Returns the instant at which one of the `wanted` flags may rise next. At that instant it rises, or the instant
+    /// has to be computed again.
     pub fn next(&self, wanted: u32) -> Option<Time> {
         if wanted == 0 || !self.counts() || self.hz == 0 {
             return None;
@@ -150,7 +151,7 @@ impl Counter {
         Some(self.anchor + Time::cycles(self.done + cycles, self.hz))
     }
 
-    /// Whether the counter moves: it is blocked while the reload value is 0 (15.4.12).
+    /// Returns whether the counter moves: it is blocked while the reload value is 0 (15.4.12).
     const fn counts(&self) -> bool {
         self.running && self.reload.active != 0
     }
@@ -159,8 +160,8 @@ impl Counter {
         u64::from(self.divider.active) + 1
     }
 
-    /// The last value before the counter wraps. A counter that is already past the reload value counts up to its
-    /// maximum.
+    /// Returns the last value before the counter wraps. A counter that is already past the reload value counts up to
+    /// its maximum.
     const fn top(&self) -> u32 {
         if self.count <= self.reload.active {
             self.reload.active
@@ -169,7 +170,7 @@ impl Counter {
         }
     }
 
-    /// Cycles until the counter reaches `value`, which is above it.
+    /// Returns the cycles until the counter reaches `value`, which is above it.
     fn cycles_to(&self, value: u32) -> u64 {
         u64::from(value - self.count) * self.period() - u64::from(self.prescaler)
     }
@@ -240,7 +241,7 @@ impl Counter {
         true
     }
 
-    /// The compare flags of the channels whose value is in `from..=to`.
+    /// Returns the compare flags of the channels whose value is in `from..=to`.
     fn matches(&self, from: u32, to: u32) -> u32 {
         self.compare
             .iter()

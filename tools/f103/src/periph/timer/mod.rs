@@ -127,19 +127,19 @@ impl Timer {
         self
     }
 
-    /// TIM1's update interrupt, TIM1_UP.
+    /// Returns the level of TIM1's update interrupt, TIM1_UP.
     #[must_use]
     pub const fn update_irq(&self) -> bool {
         self.sr & self.dier & UPDATE != 0
     }
 
-    /// TIM1's capture and compare interrupt, TIM1_CC.
+    /// Returns the level of TIM1's capture and compare interrupt, TIM1_CC.
     #[must_use]
     pub const fn capture_compare_irq(&self) -> bool {
         self.sr & self.dier & FLAGS & !UPDATE != 0
     }
 
-    /// The flags among `flags` that can rise: compare flags are those of outputs.
+    /// Returns the flags among `flags` that can rise: compare flags are those of outputs.
     fn risen(&self, flags: u32) -> u32 {
         let inputs: u32 = (0..4)
             .filter(|&n| self.selection(n) != 0)

@@ -111,7 +111,7 @@ impl Usart {
         }
     }
 
-    /// Number of writes to the data register since the last reset, with those that were lost.
+    /// Returns the number of writes to the data register since the last reset, with those that were lost.
     #[must_use]
     pub const fn data_writes(&self) -> u64 {
         self.data_writes
@@ -123,9 +123,9 @@ impl Usart {
         self.tx.take_sent()
     }
 
-    /// The rate and format of the USART. A rate within 2 % of a usual one is rounded to it. `None` while the USART is
-    /// off, or for a format that is not in [`Format`]. 7N2 is returned as 8N1, because the registers have the same
-    /// values in both; only the words that are sent differ.
+    /// Returns the rate and format of the USART. A rate within 2 % of a usual one is rounded to it. `None` while the
+    /// USART is off, or for a format that is not in [`Format`]. 7N2 is returned as 8N1, because the registers have the
+    /// same values in both; only the words that are sent differ.
     #[must_use]
     pub fn settings(&self) -> Option<Settings> {
         let format = match (self.data_bits(), self.parity(), self.stop_bits()) {
@@ -170,7 +170,7 @@ impl Usart {
         }
     }
 
-    /// Rate and format of the next character; `None` while the transmitter is off.
+    /// Returns the rate and format of the next character; `None` while the transmitter is off.
     fn shape(&self) -> Option<Shape> {
         let on = cr1::UE | cr1::TE;
         (self.cr1 & on == on && self.hz > 0 && self.brr >= 16).then(|| Shape {

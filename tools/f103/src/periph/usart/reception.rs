@@ -6,7 +6,7 @@ use crate::serial::{Framing, Rate, Word};
 use crate::time::Time;
 
 impl Usart {
-    /// The level at the RX pin is `level` from `at` on. Edges come in order, and before the
+    /// Sets the level at the RX pin to `level` from `at` on. Edges come in order, and before the
     /// [`Peripheral::advance`](crate::peripheral::Peripheral::advance) to or past their instant.
     pub fn receive_edge(&mut self, at: Time, level: bool) {
         self.rx_pin.push(at, level);
@@ -14,8 +14,8 @@ impl Usart {
         *last = [last[1], Some(at)];
     }
 
-    /// Whether the receiver is on and waits for a start bit: only then does the next edge at its pin
-    /// matter before [`Peripheral::next_event`](crate::peripheral::Peripheral::next_event).
+    /// Returns whether the receiver is on and waits for a start bit: only then does the next edge at its pin matter
+    /// before [`Peripheral::next_event`](crate::peripheral::Peripheral::next_event).
     #[must_use]
     pub fn awaits_start(&self) -> bool {
         self.receiving() && self.receiver.is_idle()
@@ -25,7 +25,7 @@ impl Usart {
         self.cr1 & (cr1::UE | cr1::RE) == cr1::UE | cr1::RE && self.framing().is_some()
     }
 
-    /// The framing of the receiver; `None` without a clock or with a BRR below 1.
+    /// Returns the framing of the receiver; `None` without a clock or with a BRR below 1.
     pub(super) fn framing(&self) -> Option<Framing> {
         (self.hz > 0 && self.brr >= 16).then(|| Framing {
             rate: Rate::from_clock(self.brr, self.hz),
@@ -77,7 +77,7 @@ impl Usart {
         self.quiet_since = word.end;
     }
 
-    /// When the line has been high for a whole frame since the last character, going by its edges up
+    /// Returns when the line has been high for a whole frame since the last character, going by its edges up
     /// to `until`: the instant of IDLE (27.3.3, "Idle character").
     pub(super) fn idle_at(&self, framing: &Framing, until: Time) -> Option<Time> {
         if !self.idle_armed {

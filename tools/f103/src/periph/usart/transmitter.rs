@@ -73,17 +73,17 @@ impl Transmitter {
         }
     }
 
-    /// When what is in the shift register ends.
+    /// Returns the end of what is in the shift register.
     pub fn shift_end(&self) -> Option<Time> {
         self.shift.map(|(_, end)| end)
     }
 
-    /// Whether a character or a break is being sent.
+    /// Returns whether a character or a break is being sent.
     pub fn is_sending(&self) -> bool {
         matches!(self.shift, Some((Content::Data | Content::Break, _)))
     }
 
-    /// Whether the transmit data register holds a word that has not begun.
+    /// Returns whether the transmit data register holds a word that has not begun.
     pub fn holds_data(&self) -> bool {
         self.data.is_some()
     }
@@ -103,7 +103,8 @@ impl Transmitter {
         self.break_wanted = wanted;
     }
 
-    /// Starts what waits, at the first tick of the baud generator from `at` on, if the shift register is free. Returns what was started.
+    /// Starts what waits, at the first tick of the baud generator from `at` on, if the shift register is free. Returns
+    /// what was started.
     pub fn start(&mut self, at: Time, shape: Shape) -> Option<Ended> {
         if self.shift.is_some() {
             return None;
@@ -141,8 +142,8 @@ impl Transmitter {
         Some(Ended::More { took_data: true })
     }
 
-    /// The shift register is empty from `at` on, where it said it would be. `shape` is `None` when the
-    /// transmitter may not begin anything new. Also returns whether it was a break that ended.
+    /// Empties the shift register at `at`, when it said it would be empty. `shape` is `None` when the transmitter may
+    /// not begin anything new. Also returns whether it was a break that ended.
     pub fn finish(&mut self, at: Time, shape: Option<Shape>) -> (Ended, bool) {
         let was_break = matches!(self.shift, Some((Content::Break, _)));
         self.shift = None;
@@ -150,7 +151,7 @@ impl Transmitter {
         (next.unwrap_or(Ended::Complete), was_break)
     }
 
-    /// TE is cleared at `now`: a character under way is lost. Returns whether it was a character or a break.
+    /// Clears TE at `now`: a character under way is lost. Returns whether it was a character or a break.
     pub fn stop(&mut self, now: Time) -> bool {
         let sending = self.is_sending();
         if sending {
@@ -161,7 +162,7 @@ impl Transmitter {
         sending
     }
 
-    /// Whether something was sent since the last [`Transmitter::take_sent`].
+    /// Returns whether something was sent since the last [`Transmitter::take_sent`].
     pub fn has_sent(&self) -> bool {
         !self.sent.is_empty()
     }

@@ -26,7 +26,7 @@ pub trait Wire {
     /// Advances the wire to `to`.
     fn advance(&mut self, to: Time);
 
-    /// The instant of the last [`Wire::advance`].
+    /// Returns the instant of the last [`Wire::advance`].
     fn now(&self) -> Time;
 
     /// Takes the edges at the RX pin that have happened since the last call: when, and the level after each.
@@ -34,23 +34,23 @@ pub trait Wire {
         Vec::new()
     }
 
-    /// The instant of the next edge at the RX pin, as far as it is known. An edge that has happened and was not
+    /// Returns the instant of the next edge at the RX pin, as far as it is known. An edge that has happened and was not
     /// taken counts as one at [`Wire::now`].
     fn next_edge(&self) -> Option<Time> {
         None
     }
 
-    /// Whether an edge at the RX pin has happened that was not taken.
+    /// Returns whether an edge at the RX pin has happened that was not taken.
     fn has_edges(&self) -> bool {
         false
     }
 
-    /// The level at the RX pin.
+    /// Returns the level at the RX pin.
     fn rx_level(&self) -> bool {
         true
     }
 
-    /// How the device drives the RX pin.
+    /// Returns how the device drives the RX pin.
     fn rx_drive(&self) -> Drive {
         match self.rx_level() {
             true => Drive::High,
@@ -58,8 +58,8 @@ pub trait Wire {
         }
     }
 
-    /// Instant of the next event of the device, other than an edge at the RX pin: the wire has to be advanced to it. It
-    /// is not before the last [`Wire::advance`].
+    /// Returns the instant of the next event of the device, other than an edge at the RX pin: the wire has to be
+    /// advanced to it. It is not before the last [`Wire::advance`].
     fn next_event(&self) -> Option<Time> {
         None
     }
@@ -97,7 +97,7 @@ impl Usart {
         }
     }
 
-    /// The next instant at which something happens in the USART, caused by itself or by its wire.
+    /// Returns the next instant at which something happens in the USART, caused by itself or by its wire.
     #[must_use]
     pub fn next_exchange(&self, wire: &dyn Wire) -> Option<Time> {
         let listens = self.awaits_start() || wire.has_edges();
@@ -108,22 +108,22 @@ impl Usart {
             .min()
     }
 
-    /// Whether the transmitter has sent something that was not passed to its wire yet.
+    /// Returns whether the transmitter has sent something that was not passed to its wire yet.
     #[must_use]
     pub fn has_sent(&self) -> bool {
         self.tx.has_sent()
     }
 
-    /// The length of a bit that it sends; `None` while the transmitter is off.
+    /// Returns the length of a bit that it sends; `None` while the transmitter is off.
     #[must_use]
     pub fn bit(&self) -> Option<Time> {
         let shape = self.shape()?;
         Some(Rate::from_clock(shape.bit_cycles, shape.hz).bits(1))
     }
 
-    /// The earliest instant at which a character can begin that has not begun, if the core does nothing before `now`
-    /// but may do anything then: the end of what is under way, or else a tick of the baud generator.
-    /// `None` while the transmitter is off: then an idle frame comes first.
+    /// Returns the earliest instant at which a character can begin that has not begun, if the core does nothing before
+    /// `now` but may do anything then: the end of what is under way, or else a tick of the baud generator. `None` while
+    /// the transmitter is off: then an idle frame comes first.
     #[must_use]
     pub fn earliest_start(&self, now: Time) -> Option<Time> {
         let shape = self.shape()?;

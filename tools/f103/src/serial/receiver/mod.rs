@@ -33,7 +33,7 @@ pub struct Framing {
 }
 
 impl Framing {
-    /// The framing of an end of the line with these settings.
+    /// Returns the framing of an end of the line with these settings.
     #[must_use]
     pub const fn of(settings: Settings) -> Self {
         let parity = settings.format.parity();
@@ -46,21 +46,21 @@ impl Framing {
         }
     }
 
-    /// The data bits of a word without the parity bit.
+    /// Returns the data bits of a word without the parity bit.
     #[must_use]
     pub const fn payload(&self, data: u16) -> u16 {
         let bits = self.data_bits - self.parity.is_some() as u8;
         data & !(u16::MAX << bits)
     }
 
-    /// Number of bits in a character, with the start and stop bits.
+    /// Returns the number of bits in a character, with the start and stop bits.
     #[must_use]
     pub const fn bits(&self) -> u8 {
         1 + self.data_bits + self.stop_bits
     }
 
-    /// Start of a start bit by the samples, when its edge is at `edge`: a sixteenth of a bit before the first sample
-    /// after the edge.
+    /// Returns the start of a start bit by the samples, when its edge is at `edge`: a sixteenth of a bit before the
+    /// first sample after the edge.
     fn start_of(&self, edge: Time) -> Time {
         let Some(since) = self.sampled_since.filter(|&since| since < edge) else {
             return edge;
@@ -70,14 +70,14 @@ impl Framing {
         since + first - self.rate.sixteenths(1)
     }
 
-    /// Time from the start bit's edge to the last sample (the tenth) of the first stop bit.
+    /// Returns the time from the start bit's edge to the last sample (the tenth) of the first stop bit.
     fn until_stop_sample(&self) -> Time {
         self.rate
             .sixteenths(16 * (1 + u64::from(self.data_bits)) + 10)
     }
 
-    /// Time from the start bit's edge until the word is received: to the last sample of a single stop bit, or to the
-    /// end of the first of two stop bits (RM0008 27.3.3, "Configurable stop bits during reception").
+    /// Returns the time from the start bit's edge until the word is received: to the last sample of a single stop bit,
+    /// or to the end of the first of two stop bits (RM0008 27.3.3, "Configurable stop bits during reception").
     fn until_word(&self) -> Time {
         if self.stop_bits == 2 {
             self.rate.bits(2 + u64::from(self.data_bits))
@@ -90,7 +90,7 @@ impl Framing {
 /// A received word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Word {
-    /// Falling edge of the start bit, by the samples.
+    /// Returns the falling edge of the start bit, by the samples.
     pub start: Time,
     /// Instant at which the word was received.
     pub at: Time,
@@ -118,7 +118,7 @@ pub struct Receiver {
 }
 
 impl Receiver {
-    /// A receiver that is enabled at `now`. Its first character begins with a falling edge after `now`.
+    /// Returns a receiver that is enabled at `now`. Its first character begins with a falling edge after `now`.
     #[must_use]
     pub const fn listening_from(now: Time) -> Self {
         Self {
@@ -128,7 +128,7 @@ impl Receiver {
         }
     }
 
-    /// Whether the receiver waits for a start bit.
+    /// Returns whether the receiver waits for a start bit.
     #[must_use]
     pub const fn is_idle(&self) -> bool {
         self.start.is_none()
@@ -140,13 +140,13 @@ impl Receiver {
         self.start
     }
 
-    /// Instant at which the character that is being received will be complete, if it is no glitch.
+    /// Returns the instant at which the character that is being received will be complete, if it is no glitch.
     #[must_use]
     pub fn due(&self, framing: &Framing) -> Option<Time> {
         self.start.map(|start| start + framing.until_word())
     }
 
-    /// Instant before which the receiver needs no edges any more.
+    /// Returns the instant before which the receiver needs no edges any more.
     #[must_use]
     pub fn needs_from(&self) -> Time {
         self.start.unwrap_or(self.search_from)
@@ -231,7 +231,7 @@ fn check_start_bit(wave: &Wave, framing: &Framing, start: Time, now: Time) -> St
     StartBit::Confirmed
 }
 
-/// Number of high levels among three samples of bit `bit`.
+/// Returns the number of high levels among three samples of bit `bit`.
 fn highs(wave: &Wave, framing: &Framing, start: Time, bit: u8, samples: [u64; 3]) -> usize {
     samples
         .into_iter()
