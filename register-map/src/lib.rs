@@ -31,6 +31,7 @@ mod commit;
 pub mod configuration;
 pub mod counters;
 pub mod fault;
+mod kind;
 pub mod limits;
 mod module;
 pub mod part;

@@ -3,7 +3,7 @@
 use core::fmt;
 use core::str::FromStr;
 
-use crate::points::Kind::{self, BitInput, BitOutput, WordInput, WordOutput};
+use crate::kind::Kind::{self, BitInput, BitOutput, WordInput, WordOutput};
 
 /// Declares the modules: one row for each with its code, its name, and the kinds of the four points of its port.
 macro_rules! modules {

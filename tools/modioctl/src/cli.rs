@@ -8,6 +8,7 @@ use register_map::codes::{Baud, Format};
 
 use crate::bus::Options;
 use crate::bus::endpoint::{RATES, duration};
+use crate::export::ExportFormat;
 use crate::names::port_number;
 
 /// Finds, sets up and watches modio units over Modbus
@@ -357,21 +358,6 @@ fn line_name(text: &str) -> Result<String, String> {
             "{text:?} is not a name of letters A to Z, digits, spaces and `.`, `_`, `-`, 64 at most"
         ))
     }
-}
-
-/// A system for which a configuration can be written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum ExportFormat {
-    /// A table of all points and registers
-    Csv,
-    /// The description of the unit, with the endpoint
-    Json,
-    /// YAML for the integrations modbus and template
-    HomeAssistant,
-    /// TOML for the input plugin modbus
-    Telegraf,
-    /// A flow with nodes of node-red-contrib-modbus
-    NodeRed,
 }
 
 #[cfg(test)]

@@ -3,7 +3,6 @@
 use modio_description::{Description, PointKind, Reading, Register, Scope, Table, Value, Values};
 
 use crate::failure::Failure;
-use crate::value::number_of;
 
 /// Number of points of a port.
 const CHANNELS: u16 = 4;
@@ -197,6 +196,18 @@ fn slug(name: &str) -> String {
     match name.split_once('.') {
         Some((port, _)) if port.parse::<u8>().is_ok() => format!("p{name}"),
         _ => name,
+    }
+}
+
+/// Parses a number from 0 to 65535, decimal or hexadecimal.
+pub fn number_of(text: &str) -> Option<u16> {
+    // The functions of the standard library also accept a sign.
+    if text.contains(['+', '-']) {
+        return None;
+    }
+    match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
+        Some(digits) => u16::from_str_radix(digits, 16).ok(),
+        None => text.parse().ok(),
     }
 }
 

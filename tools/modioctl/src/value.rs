@@ -4,7 +4,7 @@ use modio_description::{Table, Unit, Value, Values};
 use serde_json::{Value as Json, json};
 
 use crate::failure::Failure;
-use crate::names::{Item, Meaning};
+use crate::names::{Item, Meaning, number_of};
 
 /// A value as read: one or more registers, or a bit.
 #[derive(Clone, Debug, PartialEq)]
@@ -237,18 +237,6 @@ fn check_raw(item: &Item, word: u16) -> Result<(), String> {
         (Meaning::Bit, _) if word > 1 => Err("a bit is 0 or 1".to_owned()),
         (_, Some(values)) if !allow(values, word) => Err(takes(values, &Unit::default())),
         _ => Ok(()),
-    }
-}
-
-/// Parses a number from 0 to 65535, decimal or hexadecimal.
-pub fn number_of(text: &str) -> Option<u16> {
-    // The functions of the standard library also accept a sign.
-    if text.contains(['+', '-']) {
-        return None;
-    }
-    match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
-        Some(digits) => u16::from_str_radix(digits, 16).ok(),
-        None => text.parse().ok(),
     }
 }
 

@@ -9,7 +9,7 @@ use std::time::Duration;
 use modio_description::{Unit, describe};
 use modioctl::bus::adu::Framing;
 use modioctl::bus::{Endpoint, Place};
-use modioctl::cli::ExportFormat;
+use modioctl::export::ExportFormat;
 use modioctl::export::{Line, Source, text};
 use modioctl::names::Book;
 use register_map::board::MODIO_02;

@@ -7,7 +7,7 @@ use modbus_line::exact::{Ability, Event, Hello, LONGEST_RUN, Piece, Reply, Reque
 
 use crate::Board;
 use crate::line::{Character, Format, Settings};
-use crate::time::Time;
+use f103::time::Time;
 
 /// What the client of a board's line knows already.
 #[derive(Clone, Debug, Default)]

@@ -1,7 +1,7 @@
 //! The silence that ends a frame of Modbus RTU.
 
-use crate::serial::Settings;
-use crate::time::Time;
+use f103::serial::Settings;
+use f103::time::Time;
 
 /// Returns the shortest silence that ends an RTU frame: t3.5 for a unit that counts characters of this format.
 ///
@@ -16,7 +16,7 @@ pub fn frame_silence(settings: Settings) -> Time {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::serial::Format;
+    use f103::serial::Format;
 
     #[test]
     fn frame_silence_counts_the_bits_of_the_format_up_to_19200() {

@@ -21,9 +21,9 @@ pub use channel::{Channel, Error, MAX_MILLIVOLTS};
 use mcp4728::{Mcp4728, Setting};
 use register_map::Module;
 
-use crate::periph::gpio::Drive;
-use crate::periph::i2c::{Bus, Wires};
-use crate::time::Time;
+use f103::periph::gpio::Drive;
+use f103::periph::i2c::{Bus, Wires};
+use f103::time::Time;
 
 /// Default source impedance of an analog input, in ohms. It is more than that of the range with the highest impedance:
 /// the thermistor at 25 degrees Celsius with its pull-up has 5 kOhm.

@@ -7,12 +7,12 @@ use std::path::Path;
 use crate::running::*;
 
 #[allow(dead_code, reason = "the tests of the core use all of the assembler")]
-#[path = "../machine/asm.rs"]
+#[path = "../../../f103/tests/machine/asm.rs"]
 mod asm;
-#[path = "../machine/echo.rs"]
+#[path = "../board/echo.rs"]
 mod echo;
 #[allow(dead_code, reason = "the tests of the core use all of the registers")]
-#[path = "../machine/regs.rs"]
+#[path = "../../../f103/tests/machine/regs.rs"]
 mod regs;
 
 /// Writes an ELF file whose firmware sends each byte from the air back, plus one.
