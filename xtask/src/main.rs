@@ -67,15 +67,7 @@ enum Command {
     Gdb(debug::GdbOptions),
     /// Build the image and run it on the virtual board
     #[command(disable_help_flag = true)]
-    Sim {
-        /// Options of modio-sim; --help lists them
-        #[arg(
-            value_name = "OPTIONS",
-            trailing_var_arg = true,
-            allow_hyphen_values = true
-        )]
-        arguments: Vec<OsString>,
-    },
+    Sim(PassedOn),
     /// Run the steps that a change must pass, or those named
     Test(test::Options),
     /// Run the steps of CI: formatting, lints, documentation, those of `test` and longer ones
@@ -90,15 +82,7 @@ enum Command {
     Renode(renode::Options),
     /// Test a real board on its serial line: conformance, timing, wires
     #[command(disable_help_flag = true)]
-    Hil {
-        /// Options of modio-hil; --help lists them
-        #[arg(
-            value_name = "OPTIONS",
-            trailing_var_arg = true,
-            allow_hyphen_values = true
-        )]
-        arguments: Vec<OsString>,
-    },
+    Hil(PassedOn),
     /// Test well-known Modbus servers with the conformance suite, and renew the table in docs/conformance.md
     Peers(peers::Options),
     /// Run the fuzz targets: framers, server, configuration store and descriptions
@@ -112,6 +96,18 @@ enum Command {
     Docs,
     /// Take the pictures of the simulator's page in docs/images
     Screenshots,
+}
+
+/// The arguments of a program that parses them itself.
+#[derive(clap::Args, Debug)]
+struct PassedOn {
+    /// Options of the program; --help lists them
+    #[arg(
+        value_name = "OPTIONS",
+        trailing_var_arg = true,
+        allow_hyphen_values = true
+    )]
+    arguments: Vec<OsString>,
 }
 
 fn main() -> ExitCode {
@@ -141,14 +137,14 @@ fn run(cli: Cli) -> Result<()> {
         Command::Run(options) => debug::run(workspace, &options),
         Command::Attach(options) => debug::attach(workspace, &options),
         Command::Gdb(options) => debug::gdb(workspace, &options),
-        Command::Sim { arguments } => sim::run(workspace, &arguments),
+        Command::Sim(PassedOn { arguments }) => sim::run(workspace, &arguments),
         Command::Test(options) => test::run(workspace, &options),
         Command::Ci(options) => test::ci(workspace, &options),
         Command::Size(options) => size::run(workspace, &options),
         Command::Bench(options) => bench::run(workspace, &options),
         Command::Dist(options) => dist::run(workspace, &options),
         Command::Renode(options) => renode::run(workspace, &options),
-        Command::Hil { arguments } => {
+        Command::Hil(PassedOn { arguments }) => {
             // This program has all options and does everything, including writing the image, for which it calls
             // `cargo xtask flash`. It replaces this process, so that it receives Ctrl-C and SIGTERM, restores the board,
             // and sets the exit status.
@@ -191,12 +187,12 @@ mod tests {
         for name in ["hil", "sim"] {
             let command = ["xtask", name];
             let all = command.iter().chain(&arguments);
-            let (Command::Hil { arguments: passed } | Command::Sim { arguments: passed }) =
+            let (Command::Hil(passed) | Command::Sim(passed)) =
                 Cli::try_parse_from(all).unwrap().command
             else {
                 panic!("another command");
             };
-            assert_eq!(passed, arguments);
+            assert_eq!(passed.arguments, arguments);
         }
     }
 }

@@ -62,6 +62,20 @@ impl Framing {
         }
     }
 
+    /// Returns the length of the ASCII or TCP frame at the beginning of these bytes, when it is known. The length of an
+    /// RTU frame depends on its function: see [`response_length`] and [`request_length`].
+    #[must_use]
+    pub fn length(self, bytes: &[u8]) -> Option<usize> {
+        match self {
+            Self::Rtu => None,
+            Self::Ascii => Some(bytes.windows(2).position(|two| two == b"\r\n")? + 2),
+            Self::Mbap => {
+                let header = bytes.first_chunk::<{ MBAP - 1 }>()?;
+                Some(MBAP - 1 + usize::from(u16::from_be_bytes([header[4], header[5]])))
+            }
+        }
+    }
+
     /// Returns the address and the PDU of a complete frame; `None` when it is damaged.
     #[must_use]
     pub fn open(self, frame: &[u8]) -> Option<(u8, Vec<u8>)> {

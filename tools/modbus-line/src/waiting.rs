@@ -1,6 +1,6 @@
 //! Decides whether the bytes received so far contain the answer to a request.
 
-use crate::adu::{Framing, MBAP, response_length};
+use crate::adu::{Framing, response_length};
 
 /// Number of bytes in front of an answer that are tolerated: a driver that is switched on can create them.
 const NOISE: usize = 3;
@@ -29,11 +29,7 @@ impl Waiting<'_> {
             Framing::Ascii => {
                 let starts = bytes.iter().enumerate().filter(|(_, byte)| **byte == b':');
                 let mut frames = starts.filter_map(|(start, _)| {
-                    let length = bytes
-                        .get(start..)?
-                        .windows(2)
-                        .position(|two| two == b"\r\n")?
-                        + 2;
+                    let length = self.framing.length(bytes.get(start..)?)?;
                     Some(start..start + length)
                 });
                 frames.find_map(|range| {
@@ -44,11 +40,10 @@ impl Waiting<'_> {
             Framing::Mbap => {
                 let mut start = 0;
                 loop {
-                    let header = bytes.get(start..start + MBAP - 1)?;
-                    let length = usize::from(u16::from_be_bytes([header[4], header[5]]));
-                    let range = start..start + MBAP - 1 + length;
+                    let rest = bytes.get(start..)?;
+                    let range = start..start + self.framing.length(rest)?;
                     let frame = bytes.get(range.clone())?;
-                    if header[..2] == self.transaction.to_be_bytes()
+                    if frame.starts_with(&self.transaction.to_be_bytes())
                         && let Some(pdu) = self.answer(frame)
                     {
                         return Some((pdu, range));

@@ -12,7 +12,7 @@ use std::time::Duration;
 
 use tokio::time::{Instant, sleep_until};
 
-use super::adu::{ASCII_MOST, Framing, MBAP, response_length};
+use super::adu::{ASCII_MOST, Framing, response_length};
 use super::is_from_gateway;
 use super::master::{Lost, MOST, Master};
 
@@ -196,7 +196,10 @@ impl Master {
 
 /// Removes a complete answer from the beginning of the received bytes. Returns its unit and its frame.
 fn next(framing: Framing, got: &mut Vec<u8>, found: &mut Found) -> Option<(u8, Vec<u8>)> {
-    let length = length(framing, got)?;
+    let length = match framing {
+        Framing::Rtu => response_length(&[REPORT], got),
+        Framing::Ascii | Framing::Mbap => framing.length(got),
+    }?;
     let (unit, pdu) = framing.open(got.get(..length)?)?;
     // A gateway answers for a missing unit. The request itself, which an adapter returns late, is no answer.
     let absent = match pdu[..] {
@@ -207,16 +210,4 @@ fn next(framing: Framing, got: &mut Vec<u8>, found: &mut Found) -> Option<(u8, V
         found.answered(unit);
     }
     Some((unit, got.drain(..length).collect()))
-}
-
-/// Returns the length of the frame at the beginning, if it is known.
-fn length(framing: Framing, bytes: &[u8]) -> Option<usize> {
-    match framing {
-        Framing::Rtu => response_length(&[REPORT], bytes),
-        Framing::Ascii => Some(bytes.windows(2).position(|two| two == b"\r\n")? + 2),
-        Framing::Mbap => {
-            let header = bytes.first_chunk::<MBAP>()?;
-            Some(MBAP - 1 + usize::from(u16::from_be_bytes([header[4], header[5]])))
-        }
-    }
 }

@@ -158,8 +158,7 @@ impl Splitter {
         }
         let rest = self.bytes.get(1..).unwrap_or_default();
         let again = rest.iter().position(|byte| *byte == b':').map(|at| at + 1);
-        let end = self.bytes.windows(2).position(|two| two == b"\r\n");
-        match (end.map(|end| end + 2), again) {
+        match (self.framing.length(&self.bytes), again) {
             (Some(end), again) if again.is_none_or(|again| again >= end) => {
                 if self.is_frame(end) {
                     Front::Frame(end)

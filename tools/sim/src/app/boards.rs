@@ -72,7 +72,7 @@ fn config(
         module: fitting.module,
         slots: fitting.slots.clone(),
         radio: options.lora.as_ref().map(|_| Parameters::FACTORY),
-        corner: options.corner.parse()?,
+        corner: options.corner,
         ..Config::default()
     };
     // Give each part its own unique identity and its own random seed.

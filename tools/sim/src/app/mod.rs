@@ -19,7 +19,6 @@ use std::sync::{Weak, mpsc};
 use modbus_line::adu::Framing;
 use modbus_line::exact::Request;
 use sim::Time;
-use sim::line::{Format, Settings};
 use sim::options::Options;
 
 mod action;
@@ -135,12 +134,8 @@ pub fn run(options: &Options) -> Result<(), String> {
         rehearse(options)?;
     }
     let mut bench = Bench::new(boards::fitted(options)?);
-    if let Some((baud, format)) = &options.line {
-        let format = Format::named(format).ok_or("the simulator does not know this format")?;
-        bench.fix_line(Settings {
-            baud: *baud,
-            format,
-        });
+    if let Some(line) = options.line {
+        bench.fix_line(line);
     }
     if options.fixed_line {
         bench.fix_gateway();

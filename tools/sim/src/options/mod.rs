@@ -6,6 +6,9 @@ use std::time::Duration;
 
 use register_map::{Board, Module, board::MODIO_02};
 
+use crate::Corner;
+use crate::line::Settings;
+
 mod fitting;
 mod terminals;
 mod values;
@@ -51,8 +54,8 @@ pub struct Options {
     pub bus: Option<PathBuf>,
 
     /// Corner of the part (its clocks, its ADC, the time of instructions and radio packets): nominal, slow or fast
-    #[arg(long, value_name = "NAME", default_value = "nominal", value_parser = ["nominal", "slow", "fast"])]
-    pub corner: String,
+    #[arg(long, value_name = "NAME", default_value = "nominal")]
+    pub corner: Corner,
 
     /// Store the modules of all slots in the configuration, and with --lora that the radio is on, if nothing is stored yet
     /// (default)
@@ -96,7 +99,7 @@ pub struct Options {
     /// Rate and format of the line's client, such as 9600,7N2, whatever the unit does. Without this option the client
     /// has the rate and format of the unit, except 7N2: the unit's UART is set to 8N1 then
     #[arg(long, value_name = "RATE,FORMAT", value_parser = line)]
-    pub line: Option<(u32, String)>,
+    pub line: Option<Settings>,
 
     /// Let the line's client keep its own rate and format, as on a real bus: the rate that the master sets on the
     /// pseudo-terminal, and the format that the unit has at the start. Also let the gateway radio of --lora keep its
@@ -183,7 +186,7 @@ pub fn one_line(error: &clap::Error) -> String {
 mod tests {
     use super::*;
     use clap::Parser;
-    use register_map::{board::MODIO_08, codes::Format};
+    use register_map::{board::MODIO_08, codes};
 
     #[derive(Parser)]
     struct Cli {
@@ -201,7 +204,7 @@ mod tests {
     fn default_is_unit_1_with_a_4di_and_a_preset() {
         let options = parse(&[]).unwrap();
         assert_eq!((options.dip, options.module), (1, Module::Di4));
-        assert_eq!(options.corner, "nominal");
+        assert_eq!(options.corner, Corner::Nominal);
         assert_eq!(options.http, "127.0.0.1:8502".parse().unwrap());
         assert!(options.preset());
         assert_eq!((options.pty, options.tcp), (None, None));
@@ -273,10 +276,10 @@ mod tests {
 
     #[test]
     fn line_option_accepts_every_format_of_the_register_map() {
-        for (_, name) in Format::NAMES {
+        for (_, name) in codes::Format::NAMES {
             let text = format!("19200,{}", name.to_lowercase());
-            let line = parse(&["--line", &text]).unwrap().line;
-            assert_eq!(line, Some((19_200, (*name).to_owned())));
+            let line = parse(&["--line", &text]).unwrap().line.unwrap();
+            assert_eq!((line.baud, line.format.name()), (19_200, *name));
         }
     }
 
@@ -293,7 +296,7 @@ mod tests {
         for (arguments, part) in [
             (&["--dip", "256"][..], "256 is not in 0..=255"),
             (&["--module", "8di"][..], "one of none, 4di"),
-            (&["--corner", "hot"][..], "nominal, slow, fast"),
+            (&["--corner", "hot"][..], "nominal, slow or fast"),
             (&["--tcp", "nowhere"][..], "not an address"),
             (&["--http", "127.0.0.1:99999"][..], "not an address"),
             (&["--flash"][..], "--flash <FILE>"),

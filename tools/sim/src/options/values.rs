@@ -4,7 +4,9 @@ use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::PathBuf;
 
 use modbus_line::RATES;
-use register_map::{Board, Module, codes::Format};
+use register_map::{Board, Module};
+
+use crate::line::{Format, Settings};
 
 /// Parses `FILE` or `BOARD=FILE`. A text in front of `=` that is not the name of a board is part of the file's name.
 pub fn elf(text: &str) -> Result<(Option<&'static Board>, PathBuf), String> {
@@ -50,16 +52,14 @@ pub fn slot(text: &str) -> Result<(u8, Module), String> {
 }
 
 /// Parses `RATE,FORMAT`: a rate in bit/s, 300 to 4000000, and the name of a format.
-pub fn line(text: &str) -> Result<(u32, String), String> {
-    let wrong = || format!("{text:?} is not a rate and format such as 9600,7N2");
-    let (rate, name) = text.split_once(',').ok_or_else(wrong)?;
-    let known = |(_, format): &&(u16, &str)| format.eq_ignore_ascii_case(name);
-    let (_, format) = Format::NAMES.iter().find(known).ok_or_else(wrong)?;
-    let rate = rate.parse().map_err(|_| wrong())?;
-    let possible = RATES.contains(&i64::from(rate));
-    possible
-        .then(|| (rate, (*format).to_owned()))
-        .ok_or_else(wrong)
+pub fn line(text: &str) -> Result<Settings, String> {
+    let parsed = text.split_once(',').and_then(|(baud, name)| {
+        let baud = baud.parse().ok()?;
+        let format = Format::named(&name.to_ascii_uppercase())?;
+        let possible = RATES.contains(&i64::from(baud));
+        possible.then_some(Settings { baud, format })
+    });
+    parsed.ok_or_else(|| format!("{text:?} is not a rate and format such as 9600,7N2"))
 }
 
 /// Parses `HOST:PORT`. If a name has several addresses, returns the first IPv4 address, because clients try it, too.
