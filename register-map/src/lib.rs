@@ -27,6 +27,7 @@
 mod block;
 pub mod board;
 pub mod codes;
+mod commit;
 pub mod configuration;
 pub mod counters;
 pub mod fault;
@@ -45,6 +46,8 @@ mod values;
 
 pub use block::{Block, Scope, Text};
 pub use board::Board;
+#[doc(hidden)]
+pub use git_version::git_version;
 pub use module::{Module, UnknownModule};
 pub use rule::{Access, InForce, Narrower, Rule, Run, Runs, rule_at, runs};
 pub use value::{Unit, Value};

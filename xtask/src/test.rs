@@ -53,7 +53,7 @@ enum Run {
 
 /// The steps in the order in which they run: command, name, description, function. The names do not change. A step that
 /// runs for each board has the board's number at the end of its name, such as `lint-02`.
-const STEPS: [(In, &str, &str, Run); 22] = [
+const STEPS: [(In, &str, &str, Run); 21] = [
     (Ci, "fmt", "formatting", Once(formatting)),
     (Ci, "lint-host", "lints, host", Once(lint_host)),
     (Ci, "lint", "lints, target", Each(lint_target)),

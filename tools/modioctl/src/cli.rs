@@ -121,7 +121,7 @@ pub struct Units(pub Vec<u8>);
 pub struct Rates(pub Vec<u32>);
 /// Formats.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Formats(pub Vec<crate::bus::format::Format>);
+pub struct Formats(pub Vec<modbus_line::Format>);
 
 fn units(text: &str) -> Result<Units, String> {
     let wrong = || format!("{text:?} is not a list of unit addresses 1 to 247, such as 1-20,40");

@@ -27,7 +27,7 @@ fn endpoint(place: Place, framing: Framing) -> Endpoint {
     Endpoint {
         place,
         baud: 9600,
-        format: modioctl::bus::format::Format::default(),
+        format: modbus_line::Format::default(),
         framing,
         unit: 1,
         timeout: Duration::from_secs(1),

@@ -33,7 +33,7 @@ fn flow(book: Book) -> Vec<Json> {
     let endpoint = Endpoint {
         place: Place::Serial("/dev/ttyUSB0".to_owned()),
         baud: 9600,
-        format: modioctl::bus::format::Format::default(),
+        format: modbus_line::Format::default(),
         framing: Framing::Rtu,
         unit: 1,
         timeout: Duration::from_secs(1),

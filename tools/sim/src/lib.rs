@@ -8,7 +8,7 @@
 //! board      the modio-02 and the modio-08       line   the RS-485 bus and its frames
 //! bus        several boards on one line          slot   what is plugged in, and the world outside it
 //! exact_line the protocol by which a client      radio  the LoRa module, and the air with its gateway
-//!            lets time pass
+//!            lets time pass                        options the options of the command `modio-sim`
 //! ```
 
 pub mod board;
@@ -16,6 +16,7 @@ pub mod bus;
 mod error;
 pub mod exact_line;
 pub mod line;
+pub mod options;
 pub mod radio;
 pub mod slot;
 

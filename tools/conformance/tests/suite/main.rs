@@ -16,10 +16,10 @@ use conformance::endpoint::Endpoint;
 use conformance::endpoint::exact_line::Tcp;
 use conformance::endpoint::sim::{Fitting, start};
 use conformance::frame::Mode;
-use conformance::line::LineFormat;
 use conformance::probe::{Given, probe};
 use conformance::report::table;
 use conformance::run::{Options, Outcome, Verdict, run};
+use modbus_line::LineFormat;
 use register_map::board::{MODIO_02, MODIO_08};
 use register_map::{Board, Module, configuration};
 

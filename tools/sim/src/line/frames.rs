@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use modbus_frames::adu::Framing;
+use modbus_line::adu::Framing;
 
 use f103::serial::Word;
 use f103::time::Time;

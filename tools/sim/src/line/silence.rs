@@ -3,19 +3,14 @@
 use f103::serial::Settings;
 use f103::time::Time;
 
-/// The shortest silence that ends an RTU frame. Up to 19200 bit/s it is 3.5 characters of this format, above that
-/// 1750 us (Modbus over Serial Line V1.02, 2.5.1.1).
+/// Returns the shortest silence that ends an RTU frame: t3.5 for a unit that counts characters of this format.
 ///
-/// The standard counts characters of 11 bits (2.5.1). In a format with 10 bits a unit may count characters of 10 bits,
-/// and the standard demands nothing between the two values. The modio firmware counts 10 bits, so this function does,
-/// too: with 11 bits the record would join frames that the unit answers separately.
+/// The modio firmware counts them so. With the standard's 11 bits the record would join frames of a format with 10 bits
+/// that the unit answers separately.
+#[must_use]
 pub fn frame_silence(settings: Settings) -> Time {
-    if settings.baud > 19_200 {
-        Time::from_us(1750)
-    } else {
-        let half_bits = 7 * u64::from(settings.format.bits());
-        Time::cycles(half_bits, settings.baud.saturating_mul(2))
-    }
+    let silence = modbus_line::t35(settings.baud, settings.format.bits());
+    Time::from_ns(silence.as_nanos() as u64)
 }
 
 #[cfg(test)]
@@ -32,7 +27,8 @@ mod tests {
                 Format::N1 | Format::SevenE1 | Format::SevenO1 | Format::SevenN2 => 70,
             };
             for baud in [1200, 9600, 19_200] {
-                assert_eq!(at(baud), Time::cycles(bits, 2 * baud), "{format:?} {baud}");
+                let expected = Time::cycles(bits, 2 * baud);
+                assert_eq!(at(baud).as_ns(), expected.as_ns(), "{format:?} {baud}");
             }
             assert_eq!(at(38_400), Time::from_us(1750));
         }

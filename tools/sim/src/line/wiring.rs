@@ -1,7 +1,6 @@
 //! The connection of the bus to the board: the driver at the TX pin, and the receiver at the RX pin.
 
-use super::silence::frame_silence;
-use super::{Direction, HISTORY, Line, Received, Span, keep};
+use super::{Direction, HISTORY, Line, Received, Span, frame_silence, keep};
 use f103::periph::usart::{Sent, TxPin, Usart, Wire};
 use f103::serial::{Framing, Wave, Word};
 use f103::time::Time;

@@ -1,6 +1,6 @@
 //! A request on the line, until its reply was received or the time for it is over.
 
-use modbus_frames::adu::{ASCII_MOST, Framing, RTU_MOST};
+use modbus_line::adu::{ASCII_MOST, Framing, RTU_MOST};
 use sim::Time;
 use sim::line::{Direction, Frame, Line, Settings, frame_silence};
 

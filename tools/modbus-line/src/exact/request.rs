@@ -4,8 +4,8 @@ use std::fmt;
 use std::str::FromStr;
 use std::time::Duration;
 
-use crate::time::{Micros, parse};
-use crate::{LONGEST_LINE, LONGEST_RUN};
+use super::time::{Micros, parse};
+use super::{LONGEST_LINE, LONGEST_RUN};
 
 /// Something to send on the line.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,13 +1,7 @@
-//! The commit that a program is built from.
+//! The commit that a program is built from: for the registers COMMIT and BUILD, and for `--version` of the tools.
 //!
 //! Both macros ask git while the crate that calls them is compiled. Call them in a program rather than in its library,
 //! so that a commit compiles little again.
-
-#![no_std]
-#![forbid(unsafe_code)]
-
-#[doc(hidden)]
-pub use git_version::git_version;
 
 /// Expands to the first eight digits of the commit, followed by `-dirty` when files that git tracks differ from it:
 /// `1a2b3c4d`, `1a2b3c4d-dirty`. Outside a git repository, and without git, it is `unknown`.
@@ -21,7 +15,7 @@ macro_rules! commit {
     };
 }
 
-/// Expands to the version of the calling package and its [`commit!`]: `0.2.0 (1a2b3c4d)`.
+/// Expands to the version of the calling package and its [`commit!`](crate::commit!): `0.2.0 (1a2b3c4d)`.
 #[macro_export]
 macro_rules! version {
     () => {

@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 use std::fmt;
 use std::time::Duration;
 
-use crate::VERSION;
-use crate::request::Request;
-use crate::time::{Micros, parse};
+use super::VERSION;
+use super::request::Request;
+use super::time::{Micros, parse};
 
 /// An ability of a server or of its line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

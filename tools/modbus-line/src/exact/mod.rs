@@ -1,10 +1,8 @@
 //! The exact-line protocol: a serial line in virtual time, as requests and replies in lines of text.
 //!
 //! A server is an emulator or simulator in which time passes only on request; a client is a master on that line.
-//! This crate contains what both share: the types, and their text form. `docs/conformance.md` describes the
+//! This module contains what both share: the types, and their text form. `docs/conformance.md` describes the
 //! protocol.
-
-#![forbid(unsafe_code)]
 
 mod reply;
 mod request;
@@ -15,7 +13,7 @@ pub use request::{Piece, Request};
 
 use std::time::Duration;
 
-/// Version of the protocol that this crate implements.
+/// Version of the protocol that this module implements.
 pub const VERSION: u32 = 1;
 
 /// Longest request line in characters, without the line end. A server rejects longer lines.

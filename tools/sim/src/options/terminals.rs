@@ -1,6 +1,6 @@
 //! Checks of the pseudo-terminals, and of the options that a system without them needs.
 
-use crate::{Options, PTY};
+use super::{Options, PTY};
 
 impl Options {
     /// Checks that a master can reach the line on this system.
@@ -41,8 +41,8 @@ impl Options {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::parse;
     use super::*;
-    use crate::tests::parse;
 
     #[test]
     fn without_pseudo_terminals_one_of_the_tcp_options_is_needed() {

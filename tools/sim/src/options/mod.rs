@@ -1,7 +1,4 @@
 //! The command-line options of the simulator.
-//!
-//! They are a package of their own, so that `cargo xtask sim` can refuse a wrong option before it builds the image and
-//! the simulator.
 
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -123,6 +120,10 @@ pub struct Options {
     #[arg(long, value_name = "[BOARD=]FILE", value_parser = elf)]
     pub elf: Vec<(Option<&'static Board>, PathBuf)>,
 
+    /// Print the name of each board that `--elf` has no image for, and end: `cargo xtask sim` builds these images
+    #[arg(long, hide = true)]
+    pub missing_images: bool,
+
     /// Stop after this much time, such as 10s or 2m
     #[arg(long = "for", value_name = "DURATION", value_parser = humantime::parse_duration)]
     pub run_for: Option<Duration>,
@@ -146,6 +147,22 @@ impl Options {
         };
         let (_, path) = last(Some(board)).or_else(|| last(None))?;
         Some(path)
+    }
+
+    /// Returns the types of boards on the line that `--elf` has no image for.
+    ///
+    /// # Errors
+    ///
+    /// In one line, why the simulator cannot run with these options.
+    pub fn boards_without_image(&self) -> Result<Vec<&'static Board>, String> {
+        self.check_line()?;
+        let fittings = self.fittings()?;
+        let mut boards = Board::ALL.to_vec();
+        boards.retain(|board| {
+            let wanted = fittings.iter().any(|fitting| fitting.board == *board);
+            wanted && self.elf_of(board).is_none()
+        });
+        Ok(boards)
     }
 }
 
@@ -231,6 +248,20 @@ mod tests {
         assert_eq!(options.elf_of(&MODIO_02), Some(Path::new("x=c")));
         let only = parse(&["--elf", "modio-08=b"]).unwrap();
         assert_eq!(only.elf_of(&MODIO_02), None);
+    }
+
+    #[test]
+    fn boards_without_an_image_are_those_on_the_line_that_no_elf_option_names() {
+        let missing = |arguments: &[&str]| {
+            let mut options = parse(arguments).unwrap();
+            options.tcp = options.http.into();
+            options.boards_without_image()
+        };
+        assert_eq!(missing(&[]), Ok(vec![&MODIO_02]));
+        let other = ["--board", "modio-08", "--elf", "modio-02=a"];
+        assert_eq!(missing(&other), Ok(vec![&MODIO_08]));
+        assert_eq!(missing(&["--elf", "a"]), Ok(vec![]));
+        assert!(missing(&["--bus", "nowhere"]).is_err());
     }
 
     #[test]

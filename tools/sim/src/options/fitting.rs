@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use register_map::{Board, Module, board::MODIO_02};
 use serde::Deserialize;
 
-use crate::{Options, slot};
+use super::{Options, slot};
 
 /// Most boards on a line: the number of unit addresses in Modbus.
 const MOST: usize = 247;

@@ -3,6 +3,7 @@
 use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::PathBuf;
 
+use modbus_line::RATES;
 use register_map::{Board, Module, codes::Format};
 
 /// Parses `FILE` or `BOARD=FILE`. A text in front of `=` that is not the name of a board is part of the file's name.
@@ -55,7 +56,7 @@ pub fn line(text: &str) -> Result<(u32, String), String> {
     let known = |(_, format): &&(u16, &str)| format.eq_ignore_ascii_case(name);
     let (_, format) = Format::NAMES.iter().find(known).ok_or_else(wrong)?;
     let rate = rate.parse().map_err(|_| wrong())?;
-    let possible = (300..=4_000_000).contains(&rate);
+    let possible = RATES.contains(&i64::from(rate));
     possible
         .then(|| (rate, (*format).to_owned()))
         .ok_or_else(wrong)

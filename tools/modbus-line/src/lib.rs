@@ -1,18 +1,19 @@
-//! Modbus frames for people: describes a frame from a serial line or a TCP connection in words, and writes capture
-//! files.
+//! What every host tool knows of a Modbus serial line.
 //!
 //! | module | contents |
 //! |---|---|
+//! | [`LineFormat`] | rate and character format, the time of a character, t1.5 and t3.5 |
 //! | [`adu`] | frames in RTU, ASCII and TCP form: created, checked and measured |
 //! | [`names`] | names of functions and exceptions |
 //! | [`decode`] | frames, requests and responses in words, as in `modioctl sniff` and the simulator's frame log |
 //! | [`capture`] | capture files that Wireshark reads |
+//! | `port` | opens a serial port, with the feature `port` |
+//! | [`exact`] | the exact-line protocol: a serial line in virtual time |
 //!
-//! The crate only implements the standard: it knows no device, line or clock. The host tool and the simulator both
-//! use it, and it depends on neither.
+//! The crate only implements the standard and this protocol: it knows no device and has no clock.
 //!
 //! ```
-//! use modbus_frames::{Direction, adu::Framing, decode};
+//! use modbus_line::{Direction, adu::Framing, decode};
 //!
 //! let frame = Framing::Ascii.frame(0, 17, &[3, 0, 0x6B, 0, 3]);
 //! assert_eq!(frame, b":1103006B00037E\r\n");
@@ -25,9 +26,14 @@
 pub mod adu;
 pub mod capture;
 pub mod decode;
+pub mod exact;
+mod format;
 pub mod names;
+#[cfg(feature = "port")]
+pub mod port;
 mod waiting;
 
+pub use format::{Format, Limits, LineFormat, Parity, RATES, t35};
 pub use waiting::Waiting;
 
 /// Direction of a frame.
