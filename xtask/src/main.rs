@@ -92,7 +92,7 @@ enum Command {
     /// Run the conformance suite at every rate and format of the register map, in simulation, with another module for
     /// each rate
     Matrix(soak::Matrix),
-    /// Renew docs/register-map.md
+    /// Renew docs/register-map.md and the list of modules in renode/commands.py
     Docs,
     /// Take the pictures of the simulator's page in docs/images
     Screenshots,
@@ -156,9 +156,10 @@ fn run(cli: Cli) -> Result<()> {
         Command::Soak(options) => soak::run(workspace, &options),
         Command::Matrix(options) => soak::matrix(workspace, &options),
         Command::Docs => {
-            let path = workspace.root.join(docs::PATH);
-            fs_err::write(&path, docs::markdown()?)?;
-            say!("wrote {}", path.display());
+            for (path, text) in docs::files(&workspace.root)? {
+                fs_err::write(&path, text)?;
+                say!("wrote {}", path.display());
+            }
             Ok(())
         }
         Command::Screenshots => python::screenshots(workspace),

@@ -204,7 +204,8 @@ pub enum Module {
         /// The port of the slot, such as p5 or 5
         #[arg(id = "slot", value_name = "PORT", value_parser = port)]
         port: u8,
-        /// The module: none, 4di, 4do, 2relay, 4ai, 4ao or 2ai2ao
+        /// The name of the module
+        #[arg(help = format!("The module: {}", register_map::Module::ALL.map(register_map::Module::name).join(", ")))]
         module: String,
     },
 }

@@ -59,6 +59,7 @@ fn replies_have_the_described_entries() {
     );
     bench.bus.run_for(sim::Time::from_ms(20));
     let frame = get(&mut bench, "/api/frames").body["frames"][0].take();
+    assert_eq!(schemas["Module"]["enum"][1], "4di");
     for (name, reply) in [("State", state(&mut bench)), ("Frame", frame)] {
         let mut described: Vec<_> = schemas[name]["properties"]
             .as_object()

@@ -1,5 +1,4 @@
-//! Shared by all rivals: a mailbox in RAM, in which the bench writes a request and reads the response, and the
-//! data.
+//! Shared by all rivals: a mailbox in RAM, in which the bench writes a request and reads the response.
 
 #![no_std]
 
@@ -10,14 +9,7 @@ use core::{
     sync::atomic::{AtomicU32, Ordering},
 };
 
-/// Unit address of every rival.
-pub const UNIT: u8 = 1;
-/// Number of bit points of each kind that can be read and written.
-pub const BITS: usize = 2000;
-/// Number of word points of each kind that can be read and written.
-pub const WORDS: usize = 128;
-/// Length of the longest ADU.
-pub const ADU: usize = 256;
+use peers::{LONGEST, Server};
 
 /// Exchanges requests and responses between the bench and a rival. Little-endian, without padding.
 #[repr(C)]
@@ -25,8 +17,8 @@ pub struct Mailbox {
     /// Length of the request; 0 when there is none.
     request_len: AtomicU32,
     response_len: AtomicU32,
-    request: [u8; ADU],
-    response: [u8; ADU],
+    request: [u8; LONGEST],
+    response: [u8; LONGEST],
 }
 
 // SAFETY: nothing else has this name, by which the bench finds it.
@@ -34,13 +26,12 @@ pub struct Mailbox {
 static mut MAILBOX: Mailbox = Mailbox {
     request_len: AtomicU32::new(0),
     response_len: AtomicU32::new(0),
-    request: [0; ADU],
-    response: [0; ADU],
+    request: [0; LONGEST],
+    response: [0; LONGEST],
 };
 
-/// Serves requests forever. `serve` receives a complete frame including CRC, writes the complete response including
-/// CRC, and returns its length, 0 for none.
-pub fn run(mut serve: impl FnMut(&[u8], &mut [u8; ADU]) -> usize) -> ! {
+/// Serves requests forever.
+pub fn run(mut server: impl Server) -> ! {
     // SAFETY: this function does not return and only `main` calls it, so there is one reference. The bench writes
     // to the mailbox only while the request's length is 0, and reads it only at `bench_end`.
     let mailbox = unsafe { &mut *ptr::addr_of_mut!(MAILBOX) };
@@ -53,7 +44,7 @@ pub fn run(mut serve: impl FnMut(&[u8], &mut [u8; ADU]) -> usize) -> ! {
         let request = hint::black_box(&mailbox.request)
             .get(..len)
             .unwrap_or_default();
-        let len = serve(request, &mut mailbox.response);
+        let len = server.answer(request, &mut mailbox.response).unwrap_or(0);
         bench_end();
         mailbox.response_len.store(len as u32, Ordering::Relaxed);
         mailbox.request_len.store(0, Ordering::Release);
