@@ -4,7 +4,7 @@ use std::fmt::Display;
 use std::time::Duration;
 
 use crate::check::{Check, Failure, Stop};
-use crate::endpoint::{Broken, Endpoint, Piece, Received};
+use crate::endpoint::{Broken, Endpoint, Piece, Received, shown};
 use crate::frame::{Reply, hex};
 use crate::target::Target;
 
@@ -324,20 +324,4 @@ pub fn damaged_at(frame: &[u8], index: usize, damage: fn(u8) -> Piece) -> [Piece
         damage(frame[index]),
         Piece::Bytes(frame[index + 1..].to_vec()),
     ]
-}
-
-/// Returns pieces as text for people.
-pub(crate) fn shown(pieces: &[Piece]) -> String {
-    let texts: Vec<String> = pieces
-        .iter()
-        .map(|piece| match piece {
-            Piece::Bytes(bytes) => hex(bytes),
-            Piece::Gap(gap) => format!("({} us of silence)", gap.as_micros()),
-            Piece::BadParity(byte) => format!("{byte:02X} (wrong parity)"),
-            Piece::BadStop(byte) => format!("{byte:02X} (stop bit low)"),
-            Piece::Break(bits) => format!("(break of {bits} bits)"),
-            Piece::Glitch(width) => format!("(glitch of {} us)", width.as_micros()),
-        })
-        .collect();
-    texts.join(" ")
 }

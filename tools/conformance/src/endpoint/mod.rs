@@ -10,9 +10,27 @@ use std::time::Duration;
 
 use modbus_line::LineFormat;
 
+use crate::frame::hex;
+
 /// Something to send. Where time is exact, a gap has exactly the length asked for; elsewhere it may be longer. Damaged
 /// characters, breaks and glitches need [`Abilities::faults`].
 pub use modbus_line::exact::Piece;
+
+/// Returns pieces as text for people.
+pub(crate) fn shown(pieces: &[Piece]) -> String {
+    let texts: Vec<String> = pieces
+        .iter()
+        .map(|piece| match piece {
+            Piece::Bytes(bytes) => hex(bytes),
+            Piece::Gap(gap) => format!("({} us of silence)", gap.as_micros()),
+            Piece::BadParity(byte) => format!("{byte:02X} (wrong parity)"),
+            Piece::BadStop(byte) => format!("{byte:02X} (stop bit low)"),
+            Piece::Break(bits) => format!("(break of {bits} bits)"),
+            Piece::Glitch(width) => format!("(glitch of {} us)", width.as_micros()),
+        })
+        .collect();
+    texts.join(" ")
+}
 
 /// A received character, with the times of the endpoint's clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,8 +6,7 @@ use std::time::Duration;
 use delegate::delegate;
 use modbus_line::LineFormat;
 
-use super::{Abilities, Broken, Endpoint, Piece, Received};
-use crate::bench::shown;
+use super::{Abilities, Broken, Endpoint, Piece, Received, shown};
 use crate::frame::hex;
 
 /// Another endpoint, with a log of what is sent and received on it.

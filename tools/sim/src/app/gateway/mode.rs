@@ -3,7 +3,7 @@
 use modbus_line::adu::Framing;
 use register_map::{codes, configuration};
 use sim::Board;
-use sim::line::{Format, Settings};
+use sim::line::Settings;
 
 /// Value of the DIP switch for recovery mode: the line is in RTU mode, whatever is stored.
 const RECOVERY: u8 = 255;
@@ -34,10 +34,7 @@ impl Mode {
 
     /// The framing of the line. A line with 7 data bits is in ASCII mode, because RTU needs 8 (V1.02, 2.5.1).
     pub fn framing(&self, settings: Settings) -> Framing {
-        let seven = match settings.format {
-            Format::SevenE1 | Format::SevenO1 | Format::SevenN2 => true,
-            Format::N2 | Format::E1 | Format::O1 | Format::N1 => false,
-        };
+        let seven = settings.format.data_bits() == 7;
         let ascii = self.stored == codes::Mode::Ascii.code() && self.dip != RECOVERY;
         if seven || ascii {
             Framing::Ascii
@@ -50,6 +47,7 @@ impl Mode {
 #[cfg(test)]
 mod tests {
     use sim::Config;
+    use sim::line::Format;
 
     use super::*;
     use crate::app::testing::bench_of;
