@@ -1,9 +1,8 @@
-"""The client supports everything in the description of the simulator's HTTP interface (src/app/openapi.json)."""
+"""The client supports everything in the description of the simulator's HTTP interface."""
 
 import ast
-import dataclasses
 import inspect
-import json
+import os
 import pathlib
 import re
 import typing
@@ -13,7 +12,8 @@ import modio_sim
 from modio_sim.connection import Http
 
 HERE = pathlib.Path(__file__).resolve().parent
-DESCRIPTION = json.loads((HERE.parents[1] / "src/app/openapi.json").read_text())
+with modio_sim.Simulator.start(elf=os.environ["MODIO_ELF"]) as running:
+    DESCRIPTION = running.openapi()
 
 CHANNELS = [{"kind": "none"}] * 4
 STATE = {
@@ -125,21 +125,14 @@ class Paths(unittest.TestCase):
 class Types(unittest.TestCase):
     def test_every_described_member_is_a_field(self):
         schemas = DESCRIPTION["components"]["schemas"]
-        seen = set()
         for schema, of in (("State", modio_sim.State), ("Slot", modio_sim.Slot), ("Channel", modio_sim.Channel),
                            ("Frame", modio_sim.Frame), ("Finding", modio_sim.Finding), ("Board", modio_sim.BoardInfo),
-                           ("Faults", modio_sim.Faults)):
-            if schema not in schemas:
-                continue
-            seen.add(schema)
+                           ("Faults", modio_sim.Faults), ("Leds", modio_sim.Leds), ("Line", modio_sim.Line),
+                           ("Radio", modio_sim.Radio)):
             kinds = schemas[schema].get("oneOf", [schemas[schema]])
             members = {name for kind in kinds for name in kind["properties"]}
             fields = typing.get_type_hints(of).keys()
             self.assertEqual(members - fields, set(), f"{of.__name__} does not have these fields")
-        for name, of in (("leds", modio_sim.Leds), ("line", modio_sim.Line), ("radio", modio_sim.Radio)):
-            members = schemas["State"]["properties"][name]["properties"].keys()
-            self.assertEqual(members, {field.name for field in dataclasses.fields(of)})
-        self.assertGreaterEqual(seen, {"State", "Slot", "Channel", "Frame", "Finding", "Board"})
 
     def test_additional_members_of_a_newer_simulator_are_ignored(self):
         state = modio_sim.State.from_json({**STATE, "temperature": 300})

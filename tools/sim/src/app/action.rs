@@ -1,6 +1,7 @@
 //! Actions of a person or a scenario on a board.
 
 use register_map::Module;
+use utoipa::ToSchema;
 
 use super::faults::Faults;
 
@@ -34,7 +35,8 @@ pub enum Action {
 }
 
 /// A change of what is connected to a channel.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, ToSchema)]
+#[schema(rename_all = "snake_case")]
 pub enum Change {
     /// Applies a voltage to a digital input, or removes it.
     Energised(bool),

@@ -1,37 +1,49 @@
 //! Deliberate faults of the line, of the air and of a board, as in `POST /api/faults` and in scenarios.
 
-use serde::{Deserialize, Deserializer};
+use serde::{Deserialize, Deserializer, Serialize};
+use utoipa::ToSchema;
 
 /// Typical frequency of the HSI in Hz (DS5319 table 24).
 pub const HSI_HZ: f64 = 8_000_000.0;
 
-/// Faults to change; `None` leaves a fault unchanged.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+/// Faults to cause or to clear, or the faults in force. A fault that is not named keeps its value. Of the faults in
+/// force only `radio_loss` can be missing.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+#[schema(min_properties = 1)]
 pub struct Faults {
-    /// Probability that a bit time on the line is inverted, 0 to 0.5.
-    #[serde(deserialize_with = "named")]
+    /// Probability that a bit time on the line is inverted.
+    #[serde(default, deserialize_with = "named")]
+    #[schema(nullable = false, minimum = 0.0, maximum = 0.5)]
     pub bit_error_rate: Option<f64>,
-    /// Share of bytes lost between the line and the pty or socket, in each direction, 0 to 1.
-    #[serde(deserialize_with = "named")]
+    /// Share of the bytes that are lost between the line and the pseudo-terminal or the socket, in each direction.
+    #[serde(default, deserialize_with = "named")]
+    #[schema(nullable = false, minimum = 0.0, maximum = 1.0)]
     pub drop_rate: Option<f64>,
-    /// Mean number of noise pulses per second, 0 to 10,000.
-    #[serde(deserialize_with = "named")]
+    /// Pulses of 5 us on the line, in each second on average.
+    #[serde(default, deserialize_with = "named")]
+    #[schema(nullable = false, minimum = 0.0, maximum = 10000.0)]
     pub noise_hz: Option<f64>,
-    /// Share of packets that a LoRa radio loses, 0 to 1.
-    #[serde(deserialize_with = "named")]
+    /// Share of the packets that a LoRa radio loses. Only if modules are fitted (`--lora`).
+    #[serde(default, deserialize_with = "named")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, minimum = 0.0, maximum = 1.0)]
     pub radio_loss: Option<f64>,
-    /// The DACs of the plugged modules do not answer.
-    #[serde(deserialize_with = "named")]
+    /// The DACs of the board's modules do not answer.
+    #[serde(default, deserialize_with = "named")]
+    #[schema(nullable = false)]
     pub i2c_absent: Option<bool>,
-    /// The crystal does not work.
-    #[serde(deserialize_with = "named")]
+    /// The board's crystal does not work.
+    #[serde(default, deserialize_with = "named")]
+    #[schema(nullable = false)]
     pub hse_failed: Option<bool>,
-    /// Deviation of the HSI from 8 MHz, -20 to 20 %.
-    #[serde(deserialize_with = "named")]
+    /// Deviation of the part's HSI oscillator from 8 MHz, in percent.
+    #[serde(default, deserialize_with = "named")]
+    #[schema(nullable = false, minimum = -20.0, maximum = 20.0)]
     pub hsi_percent: Option<f64>,
-    /// Frequency of the LSI, 15 to 90 kHz.
-    #[serde(deserialize_with = "named")]
+    /// Frequency of the part's LSI oscillator in kHz. It clocks the watchdog.
+    #[serde(default, deserialize_with = "named")]
+    #[schema(nullable = false, minimum = 15.0, maximum = 90.0)]
     pub lsi_khz: Option<f64>,
 }
 

@@ -3,32 +3,77 @@
 use std::fmt::Write as _;
 
 use modbus_line::{adu::Framing, decode};
-use serde_json::{Value, json};
+use serde::Serialize;
 use sim::Time;
 use sim::line::{Direction, Frame, Line};
+use utoipa::ToSchema;
 
-/// The body of `GET /api/frames`: the recorded frames with numbers above `since`, oldest first.
-pub fn json(line: &Line, since: u64) -> Value {
-    json!({ "frames": line.frames_since(since).map(frame).collect::<Vec<_>>() })
+/// The frames on the line.
+#[derive(Serialize, ToSchema)]
+pub struct Frames {
+    frames: Vec<OneFrame>,
 }
 
-/// A frame as JSON.
-pub fn frame(frame: &Frame) -> Value {
-    let to_unit = frame.direction == Direction::FromMaster;
-    json!({
-        "number": frame.number,
-        // From the view of the unit, as in `rx_frames` and `tx_frames`.
-        "direction": if to_unit { "rx" } else { "tx" },
-        "start_us": frame.start.as_us(),
-        "end_us": frame.end.as_us(),
-        "gap_us": frame.gap.map(Time::as_us),
-        "turnaround_us": frame.turnaround.map(Time::as_us),
-        "silence_us": frame.longest_gap.as_ns() as f64 / 1e3,
-        "bytes": hex(&frame.bytes),
-        "summary": summary(frame),
-        "crc_ok": frame.crc_ok,
-        "damaged": frame.damaged,
-    })
+/// A frame on the line.
+#[derive(Serialize, ToSchema)]
+#[schema(as = Frame)]
+pub struct OneFrame {
+    number: u64,
+    direction: Way,
+    start_us: u64,
+    end_us: u64,
+    /// Silence before the frame, since the end of the frame before; null for the first frame.
+    #[schema(required)]
+    gap_us: Option<u64>,
+    /// For the reply to a request: the time from the end of the request to the start of the reply; null for any other
+    /// frame.
+    #[schema(required)]
+    turnaround_us: Option<u64>,
+    /// Longest silence between two characters of the frame.
+    silence_us: f64,
+    /// The bytes of the frame in hexadecimal.
+    bytes: String,
+    summary: String,
+    /// The CRC is right, or the LRC of an ASCII frame.
+    crc_ok: bool,
+    /// A character was bad, or two senders were active.
+    damaged: bool,
+}
+
+/// Direction from the view of the unit: `rx` is a frame to the unit, `tx` a frame from the unit.
+#[derive(Serialize, ToSchema)]
+#[serde(rename_all = "lowercase")]
+#[schema(as = Direction)]
+enum Way {
+    Rx,
+    Tx,
+}
+
+/// The recorded frames with numbers above `since`, oldest first.
+pub fn since(line: &Line, since: u64) -> Frames {
+    Frames {
+        frames: line.frames_since(since).map(frame).collect(),
+    }
+}
+
+/// A frame as it is in JSON.
+pub fn frame(frame: &Frame) -> OneFrame {
+    OneFrame {
+        number: frame.number,
+        direction: match frame.direction {
+            Direction::FromMaster => Way::Rx,
+            Direction::FromUnit => Way::Tx,
+        },
+        start_us: frame.start.as_us(),
+        end_us: frame.end.as_us(),
+        gap_us: frame.gap.map(Time::as_us),
+        turnaround_us: frame.turnaround.map(Time::as_us),
+        silence_us: frame.longest_gap.as_ns() as f64 / 1e3,
+        bytes: hex(&frame.bytes),
+        summary: summary(frame),
+        crc_ok: frame.crc_ok,
+        damaged: frame.damaged,
+    }
 }
 
 /// The meaning of a frame as text, as in `modioctl sniff`.
@@ -58,6 +103,8 @@ fn hex(bytes: &[u8]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use serde_json::json;
+
     use super::*;
 
     #[test]
@@ -88,7 +135,7 @@ mod tests {
             "crc_ok": true,
             "damaged": false,
         });
-        assert_eq!(frame(&seen), expected);
+        assert_eq!(serde_json::to_value(frame(&seen)).unwrap(), expected);
     }
 
     #[test]

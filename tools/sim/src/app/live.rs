@@ -8,7 +8,7 @@ use serde_json::Value;
 use tokio::sync::broadcast;
 
 use super::bench::Bench;
-use super::{frames, state};
+use super::{api, frames, state};
 
 /// Shortest time between two states.
 const STATE_EVERY: Duration = Duration::from_millis(100);
@@ -75,9 +75,9 @@ impl Live {
         }
         for frame in bench.bus.line().frames_since(self.frame) {
             self.frame = frame.number;
-            let _ = self
-                .listeners
-                .send(Note::new(None, "frame", &frames::frame(frame)));
+            let _ =
+                self.listeners
+                    .send(Note::new(None, "frame", &api::json(&frames::frame(frame))));
         }
         // Only making a state as JSON shows whether it has changed, and that takes its time.
         if self.compared.is_some_and(|at| now < at + STATE_EVERY) {
@@ -86,7 +86,7 @@ impl Live {
         self.compared = Some(now);
         self.states.resize(bench.units.len(), Value::Null);
         for (n, last) in self.states.iter_mut().enumerate() {
-            let whole = state::json(bench, n);
+            let whole = api::json(&state::of_board(bench, n));
             let mut timeless = whole.clone();
             timeless["virtual_ms"] = Value::Null;
             if timeless != *last {

@@ -1,124 +1,355 @@
-//! The visible state of a board as JSON: LEDs, channels, line, log, radio.
+//! The visible state of a board, as it is in JSON: LEDs, channels, line, log, radio.
 
-use serde_json::{Value, json};
-use sim::radio::{Mode, Module};
+use register_map::{Board as Kind, Module};
+use serde::Serialize;
+use sim::Board;
+use sim::radio::{self, Mode};
 use sim::slot::Slot;
-use sim::{Board, Channel};
+use utoipa::openapi::schema::{SchemaType, Type};
+use utoipa::openapi::{ObjectBuilder, RefOr, Schema};
+use utoipa::{PartialSchema, ToSchema};
 
 use super::bench::Bench;
-use super::faults::HSI_HZ;
+use super::faults::{Faults, HSI_HZ};
 
-/// The body of `GET /api/state` of board `n`.
-pub fn json(bench: &mut Bench, n: usize) -> Value {
-    let line = bench.bus.line();
-    let settings = line.settings();
-    let (to_unit, from_unit) = line.frame_counts();
-    let board = bench.bus.board(n);
-    let leds = board.leds();
-    let mut state = json!({
-        "virtual_ms": board.now().as_ms(),
-        "board": board.layout().board.name,
-        "powered": board.powered(),
-        "dip": board.dip(),
-        "address": address(board),
-        "module": board.module().name(),
-        "configured": configured(board, board.layout().slots[0].port),
-        "leds": { "activity": leds.activity, "fault": leds.fault, "run": leds.run },
-        "driver_enable": board.driver_enable(),
-        "line": {
-            "baud": settings.baud,
-            "format": settings.format.name(),
-            "rx_frames": to_unit,
-            "tx_frames": from_unit,
-        },
-        "channels": channels(board.slot()),
-        "log_tail": bench.units[n].log_tail().collect::<Vec<_>>(),
-    });
-    if board.slots().count() > 1 {
-        state["slots"] = board
-            .slots()
-            .map(|(port, slot)| one_slot(board, port, slot))
-            .collect();
-    }
-    if let Some(module) = board.radio() {
-        state["radio"] = radio(module);
-    }
-    state
+/// The state of a board.
+#[derive(Serialize, ToSchema)]
+pub struct State {
+    /// Virtual time since the start of the simulator, in ms.
+    virtual_ms: u64,
+    #[schema(schema_with = board_names)]
+    board: &'static str,
+    powered: bool,
+    #[schema(maximum = 255)]
+    dip: u8,
+    /// Unit address in force: the DIP switch at the last power-on. `null` without power, and for a position that is no
+    /// address.
+    #[schema(required, minimum = 1, maximum = 255)]
+    address: Option<u8>,
+    /// Module in the first slot.
+    module: ModuleName,
+    /// Module that the unit has stored for the first slot.
+    configured: ModuleName,
+    leds: Leds,
+    /// The RS-485 driver is on.
+    driver_enable: bool,
+    line: Line,
+    /// Channels of the first slot.
+    #[schema(min_items = 4, max_items = 4)]
+    channels: [Channel; 4],
+    /// The last lines of the firmware's log.
+    log_tail: Vec<String>,
+    /// The slots, only of a board with several slots.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    slots: Vec<OneSlot>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    radio: Option<Radio>,
 }
 
-/// The body of `GET /api/faults`: the faults in force on the line, in the air, and on board `n`.
-pub fn faults(bench: &mut Bench, n: usize) -> Value {
-    let loss = bench.bus.air().map(|air| air.loss());
+/// The LEDs that are lit.
+#[derive(Serialize, ToSchema)]
+struct Leds {
+    activity: bool,
+    fault: bool,
+    run: bool,
+}
+
+/// The line.
+#[derive(Serialize, ToSchema)]
+struct Line {
+    baud: u32,
+    #[schema(examples("8N2"))]
+    format: &'static str,
+    /// Number of frames to the unit.
+    rx_frames: u64,
+    /// Number of frames from the unit.
+    tx_frames: u64,
+}
+
+/// A channel of a slot.
+#[derive(Serialize, ToSchema)]
+#[serde(tag = "kind", rename_all = "lowercase")]
+enum Channel {
+    /// The module does not have this channel.
+    None,
+    /// A digital input.
+    Di { energised: bool },
+    /// A digital output.
+    Do { on: bool },
+    /// A relay, with its jumper.
+    Relay { energised: bool, manual: bool },
+    /// An analog input, with the voltage at its pin in mV.
+    Ai {
+        #[schema(maximum = 3300)]
+        millivolts: u16,
+    },
+    /// An analog output, with the code of the DAC.
+    Ao {
+        #[schema(maximum = 4095)]
+        code: u16,
+    },
+}
+
+impl From<sim::Channel> for Channel {
+    fn from(channel: sim::Channel) -> Self {
+        match channel {
+            sim::Channel::None => Self::None,
+            sim::Channel::Di { energised } => Self::Di { energised },
+            sim::Channel::Do { on } => Self::Do { on },
+            sim::Channel::Relay { energised, manual } => Self::Relay { energised, manual },
+            sim::Channel::Ai { millivolts } => Self::Ai { millivolts },
+            sim::Channel::Ao { code } => Self::Ao { code },
+        }
+    }
+}
+
+/// A slot of a board.
+#[derive(Serialize, ToSchema)]
+#[schema(as = Slot)]
+struct OneSlot {
+    #[schema(minimum = 1, maximum = 8)]
+    port: u8,
+    module: ModuleName,
+    /// Module that the unit has stored for this slot.
+    configured: ModuleName,
+    #[schema(min_items = 4, max_items = 4)]
+    channels: [Channel; 4],
+}
+
+/// The LoRa module, only if it is fitted (`--lora`).
+#[derive(Serialize, ToSchema)]
+struct Radio {
+    /// `null` without power, during the start, and with a fault.
+    #[schema(required, schema_with = mode_names)]
+    mode: Option<&'static str>,
+    /// The pin AUX is high: the module is idle.
+    aux: bool,
+    address: u16,
+    /// Frequency of the channel in MHz.
+    #[schema(minimum = 410, maximum = 441)]
+    channel_mhz: u16,
+    /// Bit rate on the air, in bit/s.
+    air_rate: u32,
+    /// Transmitting power in dBm.
+    power_dbm: u8,
+    packets_sent: u64,
+    packets_received: u64,
+}
+
+/// A board on the line.
+#[derive(Serialize, ToSchema)]
+#[schema(as = Board)]
+pub struct OneBoard {
+    name: String,
+    #[schema(schema_with = board_names)]
+    board: &'static str,
+    #[schema(maximum = 255)]
+    dip: u8,
+    /// Unit address in force: the DIP switch at the last power-on. `null` without power, and for a position that is no
+    /// address.
+    #[schema(required, minimum = 1, maximum = 255)]
+    address: Option<u8>,
+    powered: bool,
+    /// The fault LED is lit.
+    fault: bool,
+    /// Modules in the slots.
+    modules: Vec<ModuleName>,
+}
+
+/// The findings of the chip model.
+#[derive(Serialize, ToSchema)]
+pub struct Findings {
+    findings: Vec<Finding>,
+}
+
+/// A finding of the chip model.
+#[derive(Serialize, ToSchema)]
+struct Finding {
+    /// Virtual time of the first occurrence, in us.
+    at_us: u64,
+    /// Address of the instruction.
+    pc: String,
+    what: String,
+    count: u64,
+}
+
+/// Name of a module.
+#[derive(Serialize)]
+pub struct ModuleName(&'static str);
+
+impl From<Module> for ModuleName {
+    fn from(module: Module) -> Self {
+        Self(module.name())
+    }
+}
+
+impl PartialSchema for ModuleName {
+    fn schema() -> RefOr<Schema> {
+        one_of(Module::ALL.map(Module::name))
+    }
+}
+
+impl ToSchema for ModuleName {
+    fn name() -> std::borrow::Cow<'static, str> {
+        "Module".into()
+    }
+}
+
+/// Names of the types of boards.
+fn board_names() -> RefOr<Schema> {
+    one_of(Kind::ALL.map(|board| board.name))
+}
+
+/// Names of the modes of a LoRa module, or null.
+fn mode_names() -> RefOr<Schema> {
+    let modes = [Mode::Normal, Mode::WakeUp, Mode::PowerSaving, Mode::Sleep];
+    let names = modes.map(|mode| Some(mode.name()));
+    ObjectBuilder::new()
+        .schema_type(SchemaType::from_iter([Type::String, Type::Null]))
+        .enum_values(Some(names.into_iter().chain([None])))
+        .into()
+}
+
+/// The schema of a text that is one of these.
+fn one_of<const N: usize>(names: [&'static str; N]) -> RefOr<Schema> {
+    ObjectBuilder::new()
+        .schema_type(Type::String)
+        .enum_values(Some(names))
+        .into()
+}
+
+/// The state of board `n`.
+pub fn of_board(bench: &mut Bench, n: usize) -> State {
+    let line = bench.bus.line();
+    let settings = line.settings();
+    let (rx_frames, tx_frames) = line.frame_counts();
+    let board = bench.bus.board(n);
+    let leds = board.leds();
+    let mut slots: Vec<_> = board
+        .slots()
+        .map(|(port, slot)| one_slot(board, port, slot))
+        .collect();
+    if slots.len() == 1 {
+        slots.clear();
+    }
+    State {
+        virtual_ms: board.now().as_ms(),
+        board: board.layout().board.name,
+        powered: board.powered(),
+        dip: board.dip(),
+        address: address(board),
+        module: board.module().into(),
+        configured: configured(board, board.layout().slots[0].port),
+        leds: Leds {
+            activity: leds.activity,
+            fault: leds.fault,
+            run: leds.run,
+        },
+        driver_enable: board.driver_enable(),
+        line: Line {
+            baud: settings.baud,
+            format: settings.format.name(),
+            rx_frames,
+            tx_frames,
+        },
+        channels: channels(board.slot()),
+        log_tail: bench.units[n].log_tail().map(str::to_owned).collect(),
+        slots,
+        radio: board.radio().map(radio),
+    }
+}
+
+/// The faults in force on the line, in the air, and on board `n`.
+pub fn faults(bench: &mut Bench, n: usize) -> Faults {
+    let radio_loss = bench.bus.air().map(|air| air.loss());
     let line = &bench.disturbance;
     let board = bench.bus.board(n);
     let (hsi, lsi) = board.rc_oscillators();
     // Round, because the oscillators are set in whole hertz.
     let rounded = |value: f64| (value * 1000.0).round() / 1000.0;
-    let mut faults = json!({
-        "bit_error_rate": line.bit_error_rate(),
-        "drop_rate": line.drop_rate(),
-        "noise_hz": line.noise_hz(),
-        "i2c_absent": bench.units[n].i2c_absent,
-        "hse_failed": !board.crystal(),
-        "hsi_percent": rounded((f64::from(hsi) / HSI_HZ - 1.0) * 100.0),
-        "lsi_khz": rounded(f64::from(lsi) / 1000.0),
-    });
-    if let Some(loss) = loss {
-        faults["radio_loss"] = loss.into();
+    Faults {
+        bit_error_rate: Some(line.bit_error_rate()),
+        drop_rate: Some(line.drop_rate()),
+        noise_hz: Some(line.noise_hz()),
+        radio_loss,
+        i2c_absent: Some(bench.units[n].i2c_absent),
+        hse_failed: Some(!board.crystal()),
+        hsi_percent: Some(rounded((f64::from(hsi) / HSI_HZ - 1.0) * 100.0)),
+        lsi_khz: Some(rounded(f64::from(lsi) / 1000.0)),
     }
-    faults
+}
+
+/// The boards on the line.
+pub fn boards(bench: &Bench) -> Vec<OneBoard> {
+    let boards = bench.units.iter().zip(bench.bus.boards());
+    boards
+        .map(|(unit, board)| OneBoard {
+            name: unit.name.clone(),
+            board: board.layout().board.name,
+            dip: board.dip(),
+            address: address(board),
+            powered: board.powered(),
+            fault: board.leds().fault,
+            modules: board
+                .slots()
+                .map(|(_, slot)| slot.module().into())
+                .collect(),
+        })
+        .collect()
+}
+
+/// The findings of the chip model of board `n`.
+pub fn findings(bench: &Bench, n: usize) -> Findings {
+    let findings = bench.bus.board(n).findings().iter();
+    let findings = findings.map(|finding| Finding {
+        at_us: finding.at.as_us(),
+        pc: format!("{:#010x}", finding.pc),
+        what: finding.what.to_string(),
+        count: finding.count,
+    });
+    Findings {
+        findings: findings.collect(),
+    }
 }
 
 /// The LoRa module of a board.
-fn radio(module: &Module) -> Value {
+fn radio(module: &radio::Module) -> Radio {
     let parameters = module.parameters();
-    json!({
-        "mode": module.mode().map(Mode::name),
-        "aux": module.aux(),
-        "address": parameters.address(),
-        "channel_mhz": parameters.frequency_mhz(),
-        "air_rate": parameters.air_rate(),
-        "power_dbm": parameters.power_dbm(),
-        "packets_sent": module.packets_sent(),
-        "packets_received": module.packets_received(),
-    })
+    Radio {
+        mode: module.mode().map(Mode::name),
+        aux: module.aux(),
+        address: parameters.address(),
+        channel_mhz: parameters.frequency_mhz(),
+        air_rate: parameters.air_rate(),
+        power_dbm: parameters.power_dbm(),
+        packets_sent: module.packets_sent(),
+        packets_received: module.packets_received(),
+    }
 }
 
 /// The unit address in force; `None` without power, and if the switch had no valid position at power-on.
-pub fn address(board: &Board) -> Option<u8> {
+fn address(board: &Board) -> Option<u8> {
     let dip = board.dip_at_power_on();
     (board.powered() && matches!(dip, 1..=247 | 255)).then_some(dip)
 }
 
-/// Name of the module that the unit has stored for the slot at `port`.
-fn configured(board: &Board, port: u8) -> &'static str {
-    board.layout().configured(board.flash(), port).name()
+/// The module that the unit has stored for the slot at `port`.
+fn configured(board: &Board, port: u8) -> ModuleName {
+    board.layout().configured(board.flash(), port).into()
 }
 
-fn one_slot(board: &Board, port: u8, slot: &Slot) -> Value {
-    json!({
-        "port": port,
-        "module": slot.module().name(),
-        "configured": configured(board, port),
-        "channels": channels(slot),
-    })
-}
-
-fn channels(slot: &Slot) -> [Value; 4] {
-    [1, 2, 3, 4].map(|number| channel(slot.channel(number)))
-}
-
-fn channel(channel: Channel) -> Value {
-    match channel {
-        Channel::None => json!({ "kind": "none" }),
-        Channel::Di { energised } => json!({ "kind": "di", "energised": energised }),
-        Channel::Do { on } => json!({ "kind": "do", "on": on }),
-        Channel::Relay { energised, manual } => {
-            json!({ "kind": "relay", "energised": energised, "manual": manual })
-        }
-        Channel::Ai { millivolts } => json!({ "kind": "ai", "millivolts": millivolts }),
-        Channel::Ao { code } => json!({ "kind": "ao", "code": code }),
+fn one_slot(board: &Board, port: u8, slot: &Slot) -> OneSlot {
+    OneSlot {
+        port,
+        module: slot.module().into(),
+        configured: configured(board, port),
+        channels: channels(slot),
     }
+}
+
+fn channels(slot: &Slot) -> [Channel; 4] {
+    [1, 2, 3, 4].map(|number| slot.channel(number).into())
 }
 
 #[cfg(test)]
@@ -128,26 +359,37 @@ mod tests {
     #[test]
     fn every_kind_of_channel_has_its_json_form() {
         for (seen, expected) in [
-            (Channel::None, r#"{"kind":"none"}"#),
+            (sim::Channel::None, r#"{"kind":"none"}"#),
             (
-                Channel::Di { energised: true },
+                sim::Channel::Di { energised: true },
                 r#"{"energised":true,"kind":"di"}"#,
             ),
-            (Channel::Do { on: false }, r#"{"kind":"do","on":false}"#),
             (
-                Channel::Relay {
+                sim::Channel::Do { on: false },
+                r#"{"kind":"do","on":false}"#,
+            ),
+            (
+                sim::Channel::Relay {
                     energised: true,
                     manual: false,
                 },
                 r#"{"energised":true,"kind":"relay","manual":false}"#,
             ),
             (
-                Channel::Ai { millivolts: 3300 },
+                sim::Channel::Ai { millivolts: 3300 },
                 r#"{"kind":"ai","millivolts":3300}"#,
             ),
-            (Channel::Ao { code: 4095 }, r#"{"code":4095,"kind":"ao"}"#),
+            (
+                sim::Channel::Ao { code: 4095 },
+                r#"{"code":4095,"kind":"ao"}"#,
+            ),
         ] {
-            assert_eq!(channel(seen).to_string(), expected);
+            assert_eq!(
+                serde_json::to_value(Channel::from(seen))
+                    .unwrap()
+                    .to_string(),
+                expected
+            );
         }
     }
 }

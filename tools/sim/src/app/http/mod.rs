@@ -101,7 +101,7 @@ fn serve(
 
 /// The state that every request handler gets.
 #[derive(Clone)]
-struct Server {
+pub struct Server {
     events: Sender<Event>,
     live: broadcast::Sender<Note>,
     guard: Guard,
@@ -207,7 +207,18 @@ async fn not_get() -> api::Reply {
     api::Reply::error(405, "this path accepts GET only")
 }
 
-async fn stream_of_first(State(server): State<Server>) -> Result<Response, api::Reply> {
+/// Server-sent events: `state` at the beginning and whenever it has changed, at most ten times a second; `frame` when a frame has ended; `lost`, with the number of missed events, when the client reads too slowly
+#[utoipa::path(
+    get,
+    path = "/api/events",
+    responses((
+        status = 200,
+        description = "The stream; the data of `state` is a State, of `frame` a Frame",
+        body = String,
+        content_type = "text/event-stream",
+    ))
+)]
+pub async fn stream_of_first(State(server): State<Server>) -> Result<Response, api::Reply> {
     stream(server, 0, "/api/state").await
 }
 

@@ -6,6 +6,8 @@ mod radio;
 
 use serde_json::{Value, json};
 
+use register_map::Module;
+
 use super::*;
 use crate::app::Origin;
 use crate::app::testing::{bench, bench_of, bench_of_boards};
