@@ -51,18 +51,9 @@ mod tests {
     extern crate std;
     use std::vec::Vec;
 
-    use embedded_hal_mock::eh1::digital::{Mock, State, Transaction};
-
     use super::*;
     use crate::Kind;
-
-    /// Returns a line with these levels, one per scan: `true` is energised, which is low.
-    fn line(energised: &[bool]) -> Mock {
-        let states = energised
-            .iter()
-            .map(|&on| Transaction::get(if on { State::Low } else { State::High }));
-        Mock::new(&states.collect::<Vec<_>>())
-    }
+    use crate::digital::mock::{Mock, input};
 
     fn settings(debounce: u16) -> ChannelSettings {
         ChannelSettings {
@@ -77,7 +68,7 @@ mod tests {
 
     #[test]
     fn the_first_scan_takes_the_inputs_without_delay() {
-        let mut module = Di4::new([true, false, false, true].map(|on| line(&[on])));
+        let mut module = Di4::new([true, false, false, true].map(|on| input(&[on])));
         let mut channels = Channels::new();
         module.read_inputs(&mut channels, &[None; 4]).unwrap();
         assert_eq!(
@@ -94,7 +85,7 @@ mod tests {
             let mut levels = std::vec![false];
             levels.resize(scans, true);
             levels.resize(2 * scans - 1, false);
-            let mut module = Di4::new([(); 4].map(|()| line(&levels)));
+            let mut module = Di4::new([(); 4].map(|()| input(&levels)));
             module.configure(&[settings(debounce); CHANNELS]);
             let mut channels = Channels::new();
             let seen: Vec<bool> = levels
@@ -116,7 +107,7 @@ mod tests {
         let levels = [
             false, true, true, true, true, false, true, true, true, true, false,
         ];
-        let mut module = Di4::new([(); 4].map(|()| line(&levels)));
+        let mut module = Di4::new([(); 4].map(|()| input(&levels)));
         let mut channels = Channels::new();
         for _ in levels {
             module.read_inputs(&mut channels, &[None; 4]).unwrap();
@@ -128,7 +119,7 @@ mod tests {
     #[test]
     fn each_channel_has_its_own_debounce_and_equal_settings_do_not_disturb() {
         let levels = [false, true, true, true, true, true];
-        let mut module = Di4::new([(); 4].map(|()| line(&levels)));
+        let mut module = Di4::new([(); 4].map(|()| input(&levels)));
         let mut channels = Channels::new();
         let seen = levels.map(|_| {
             module.configure(&[0, 2, 4, 5].map(settings));

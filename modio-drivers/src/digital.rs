@@ -38,3 +38,42 @@ pub(crate) fn drive(
     }
     result
 }
+
+/// Lines for the tests of drivers.
+#[cfg(test)]
+pub(crate) mod mock {
+    extern crate std;
+    use std::vec::Vec;
+
+    use embedded_hal_mock::eh1::MockError;
+    pub use embedded_hal_mock::eh1::digital::{Mock, State, Transaction};
+
+    /// Returns an input with these levels, one for each scan: `true` is low.
+    pub fn input(low: &[bool]) -> Mock {
+        let level = |&low: &bool| if low { State::Low } else { State::High };
+        Mock::new(
+            &low.iter()
+                .map(level)
+                .map(Transaction::get)
+                .collect::<Vec<_>>(),
+        )
+    }
+
+    /// Returns an output that is driven to these levels, one in each scan: `true` is high.
+    pub fn output(high: &[bool]) -> Mock {
+        let level = |&high: &bool| if high { State::High } else { State::Low };
+        Mock::new(
+            &high
+                .iter()
+                .map(level)
+                .map(Transaction::set)
+                .collect::<Vec<_>>(),
+        )
+    }
+
+    /// Returns a line that fails in this transaction.
+    pub fn failing(transaction: Transaction) -> Mock {
+        let error = MockError::Io(std::io::ErrorKind::NotConnected);
+        Mock::new(&[transaction.with_error(error)])
+    }
+}

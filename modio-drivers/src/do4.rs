@@ -33,48 +33,33 @@ impl<P: OutputPin> IoModule for Do4<P> {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
-    use std::vec::Vec;
-
-    use embedded_hal_mock::eh1::digital::{Mock, State, Transaction};
-
     use super::*;
-
-    fn line(levels: &[State]) -> Mock {
-        Mock::new(
-            &levels
-                .iter()
-                .map(|&l| Transaction::set(l))
-                .collect::<Vec<_>>(),
-        )
-    }
+    use crate::digital::mock::{Mock, output};
 
     #[test]
     fn every_line_follows_its_bit_at_every_scan() {
-        use State::{High, Low};
         let mut module = Do4::new([
-            line(&[High, High, Low]),
-            line(&[Low, Low, High]),
-            line(&[Low, Low, Low]),
-            line(&[High, High, High]),
+            output(&[true, true, false]),
+            output(&[false, false, true]),
+            output(&[false, false, false]),
+            output(&[true, true, true]),
         ]);
         let mut channels = Channels::new();
-        channels.set_bit(0, true);
-        channels.set_bit(3, true);
-        module
-            .drive_outputs(&channels, &mut DacLink::default())
-            .unwrap();
-        module
-            .drive_outputs(&channels, &mut DacLink::default())
-            .unwrap();
-        channels.set_bit(0, false);
-        channels.set_bit(1, true);
-        module
-            .drive_outputs(&channels, &mut DacLink::default())
-            .unwrap();
+        for bits in [
+            [true, false, false, true],
+            [true, false, false, true],
+            [false, true, false, true],
+        ] {
+            for (channel, bit) in bits.into_iter().enumerate() {
+                channels.set_bit(channel, bit);
+            }
+            module
+                .drive_outputs(&channels, &mut DacLink::default())
+                .unwrap();
+        }
         assert!(
             channels.bit(1) && channels.bit(3),
-            "reading does not change outputs"
+            "driving does not change the channels"
         );
         module.lines.iter_mut().for_each(Mock::done);
     }

@@ -54,27 +54,10 @@ impl<I: InputPin, O: OutputPin> IoModule for Relay2<I, O> {
 #[cfg(test)]
 mod tests {
     extern crate std;
-    use std::vec::Vec;
-
-    use embedded_hal_mock::eh1::MockError;
-    use embedded_hal_mock::eh1::digital::{Mock, State, Transaction};
 
     use super::*;
     use crate::Kind;
-
-    const BROKEN: MockError = MockError::Io(std::io::ErrorKind::NotConnected);
-
-    fn jumper(manual: &[bool]) -> Mock {
-        let states = manual
-            .iter()
-            .map(|&on| Transaction::get(if on { State::Low } else { State::High }));
-        Mock::new(&states.collect::<Vec<_>>())
-    }
-
-    fn coil(levels: &[State]) -> Mock {
-        let levels = levels.iter().map(|&level| Transaction::set(level));
-        Mock::new(&levels.collect::<Vec<_>>())
-    }
+    use crate::digital::mock::{Mock, State, Transaction, failing, input, output};
 
     fn finish(mut module: Relay2<Mock, Mock>) {
         module.jumpers.iter_mut().for_each(Mock::done);
@@ -83,7 +66,10 @@ mod tests {
 
     #[test]
     fn jumpers_are_read_without_delay_at_the_first_scan_and_do_not_change_coils() {
-        let mut module = Relay2::new([jumper(&[true]), jumper(&[false])], [coil(&[]), coil(&[])]);
+        let mut module = Relay2::new(
+            [input(&[true]), input(&[false])],
+            [output(&[]), output(&[])],
+        );
         let mut channels = Channels::new();
         channels.set_bit(3, true);
         module.read_inputs(&mut channels, &[None; 4]).unwrap();
@@ -101,7 +87,7 @@ mod tests {
         levels.resize(wait, true);
         levels.push(false);
         levels.resize(2 * wait + 1, true);
-        let mut module = Relay2::new([jumper(&levels), jumper(&levels)], [coil(&[]), coil(&[])]);
+        let mut module = Relay2::new([input(&levels), input(&levels)], [output(&[]), output(&[])]);
         let settings = ChannelSettings {
             filter: 0,
             ..ChannelSettings::default_for(Kind::BitInput)
@@ -118,34 +104,27 @@ mod tests {
 
     #[test]
     fn coils_follow_channels_3_and_4_at_every_scan() {
-        use State::{High, Low};
         let mut module = Relay2::new(
-            [jumper(&[]), jumper(&[])],
-            [coil(&[Low, High, High]), coil(&[Low, Low, High])],
+            [input(&[]), input(&[])],
+            [output(&[false, true, true]), output(&[false, false, true])],
         );
         let mut channels = Channels::new();
         channels.set_bit(0, true);
-        channels.set_bit(1, true);
-        module
-            .drive_outputs(&channels, &mut DacLink::default())
-            .unwrap();
-        channels.set_bit(2, true);
-        module
-            .drive_outputs(&channels, &mut DacLink::default())
-            .unwrap();
-        channels.set_bit(3, true);
-        module
-            .drive_outputs(&channels, &mut DacLink::default())
-            .unwrap();
+        // The jumper of relay 2, and then the coils.
+        for channel in 1..=3 {
+            channels.set_bit(channel, true);
+            module
+                .drive_outputs(&channels, &mut DacLink::default())
+                .unwrap();
+        }
         finish(module);
     }
 
     #[test]
     fn a_line_that_fails_is_reported_and_the_others_still_work() {
-        let failing = |transaction: Transaction| Mock::new(&[transaction.with_error(BROKEN)]);
         let mut module = Relay2::new(
-            [failing(Transaction::get(State::High)), jumper(&[true])],
-            [failing(Transaction::set(State::Low)), coil(&[State::High])],
+            [failing(Transaction::get(State::High)), input(&[true])],
+            [failing(Transaction::set(State::Low)), output(&[true])],
         );
         let mut channels = Channels::new();
         channels.set_bit(3, true);

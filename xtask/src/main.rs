@@ -22,6 +22,7 @@ macro_rules! say {
     }};
 }
 
+mod adding;
 mod bench;
 mod build;
 mod command;

@@ -15,14 +15,14 @@ use crate::python::{masters, page};
 use crate::renode::checks;
 use crate::steps::{self, Done};
 use crate::workspace::{ALL, Workspace};
-use crate::{bench, build, command, fuzz, group, ordinary, peers, size, table};
+use crate::{adding, bench, build, command, fuzz, group, ordinary, peers, size, table};
 
 /// The variable with the corner of the part for the tests of the image.
 pub const CORNER: &str = "MODIO_CORNER";
 
 /// The feature with which the conformance suite contains the simulator. All tests are built with it, so that nothing is
 /// built twice.
-const SUITE: &str = "hil/sim";
+pub const SUITE: &str = "hil/sim";
 
 /// The packages of the image.
 const TARGET_PACKAGES: &str = "firmware board-support modio-drivers modbus-server register-map";
@@ -53,7 +53,7 @@ enum Run {
 
 /// The steps in the order in which they run: command, name, description, function. The names do not change. A step that
 /// runs for each board has the board's number at the end of its name, such as `lint-02`.
-const STEPS: [(In, &str, &str, Run); 21] = [
+const STEPS: [(In, &str, &str, Run); 22] = [
     (Ci, "fmt", "formatting", Once(formatting)),
     (Ci, "lint-host", "lints, host", Once(lint_host)),
     (Ci, "lint", "lints, target", Each(lint_target)),
@@ -74,6 +74,12 @@ const STEPS: [(In, &str, &str, Run); 21] = [
     (Ci, "sim-fast", "sim, fast corner", Once(sim_fast)),
     (Ci, "bench", "instructions and bytes", Each(bench::check)),
     (Ci, "peers", "Modbus servers, briefly", Once(peers::check)),
+    (
+        Ci,
+        "adding",
+        "the module of docs/adding-a-module.md",
+        Once(adding::check),
+    ),
     (Ci, "fuzz", "fuzz targets, briefly", Once(fuzz::check)),
 ];
 

@@ -21,6 +21,8 @@ const BACKGROUND: u16 = 1 << 3;
 
 /// A branch to its own address.
 const SPIN: u16 = 0xE7FE;
+/// The instruction that waits for an interrupt.
+const WFI: u16 = 0xBF30;
 /// A return from the function.
 const RETURN: u16 = 0x4770;
 
@@ -143,8 +145,11 @@ fn endless_loop_in_idle_causes_a_watchdog_reset_although_all_tasks_run() {
     while !bench.board.asleep() {
         bench.board.run_for(Time::from_us(1));
     }
-    // At the instruction after the WFI.
-    let address = bench.board.pc();
+    // The core sleeps in the WFI of the loop, so the next instruction is the one after it. The WFI itself is replaced:
+    // every pass of the loop executes it, whatever code the compiler puts around it.
+    let address = bench.board.pc() - 2;
+    let wfi = WFI.to_le_bytes();
+    assert_eq!(bench.board.patch_code(address, &wfi).unwrap(), wfi);
     let marks = break_at(&mut bench, "idle", address, SPIN);
     assert_eq!(marks, 0, "all tasks had set their marks");
 }

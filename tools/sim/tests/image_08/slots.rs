@@ -94,40 +94,6 @@ fn empty_slots_beside_relays_and_an_analog_module_have_no_points() {
     }
 }
 
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn only_ports_1_to_4_accept_a_module() {
-    let mut bench = fitted([Module::None; 4], &[]);
-    bench.unlock();
-    for port in 1..=8 {
-        let address = MODULE + port - 1;
-        let expected = if port <= 4 { Ok(()) } else { Err(3) };
-        for module in 1..=Module::LAST {
-            assert_eq!(bench.write(address, &[module]), expected, "port {port}");
-            assert_eq!(bench.write_single(6, address, module), expected);
-        }
-        assert_eq!(
-            bench.write(address, &[Module::LAST + 1]),
-            Err(3),
-            "port {port}"
-        );
-        assert_eq!(bench.write(address, &[0]), Ok(()), "port {port}");
-    }
-    assert_eq!(bench.write(MODULE, &[1, 2, 3, 4, 5, 0, 0, 0]), Err(3));
-    assert_eq!(
-        bench.registers(MODULE, 8),
-        Ok(vec![0; 8]),
-        "one invalid module refuses all"
-    );
-    bench.write(MODULE, &[1, 2, 3, 4, 0, 0, 0, 0]).unwrap();
-    assert_eq!(bench.registers(MODULE, 4), Ok(vec![1, 2, 3, 4]));
-    assert_eq!(
-        bench.registers(IN_FORCE, 8),
-        Ok(vec![0; 8]),
-        "the modules are not in force yet"
-    );
-}
-
 /// Plugs these modules while the power is off.
 fn plug(bench: &mut Bench, plugged: [Module; 4]) {
     bench.board.power_off();

@@ -1,0 +1,94 @@
+//! The step `adding`: adds the module of `docs/adding-a-module.md` to a copy of the project, and tests it there.
+//!
+//! The page and this step use the same patch, so the page cannot be out of date.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use fs_err as fs;
+use register_map::board::MODIO_02;
+
+use crate::build;
+use crate::command;
+use crate::test::SUITE;
+use crate::workspace::{ALL, Workspace};
+
+/// The patch that adds the module.
+const PATCH: &str = "docs/adding-a-module.patch";
+
+/// The packages with files in the patch.
+const PACKAGES: [&str; 3] = ["firmware", "modio-drivers", "register-map"];
+
+/// The test of the image that reads and writes the points of every module.
+const TEST: &str = "functions::points_of_every_module";
+
+/// Writes the generated documents and tests the changed packages, then tests every module with the image in simulation.
+pub fn check(workspace: &mut Workspace) -> Result<()> {
+    let mut copy = patched(workspace)?;
+    command::run(copy.cargo("run").args(["--package", "xtask", "docs"]))?;
+    let mut host = copy.cargo("test");
+    host.args(PACKAGES.map(|package| format!("--package={package}")));
+    // Without the tests of the store, which take longest.
+    command::run(host.args(["--lib", "--test=blocks"]))?;
+    let elf = build::image(&mut copy, &MODIO_02)?;
+    let mut simulated = copy.cargo("test");
+    simulated.args(ALL).args(["--features", SUITE]);
+    simulated.args(["--test=image", "--", "--include-ignored", TEST]);
+    command::run(simulated.env("MODIO_ELF", elf))
+}
+
+/// Returns a copy of the project with the patch. Its build uses the dependencies that are already compiled for the
+/// project.
+fn patched(workspace: &Workspace) -> Result<Workspace> {
+    let root = workspace.root.join("target").join("adding");
+    if root.exists() {
+        fs::remove_dir_all(&root)?;
+    }
+    for file in files(&workspace.root)? {
+        let to = root.join(&file);
+        fs::create_dir_all(to.parent().unwrap_or(&root))?;
+        fs::copy(workspace.root.join(file), to)?;
+    }
+    // Cargo keeps packages with another version apart, so it does not build those of the project again after this step.
+    let manifest = root.join("Cargo.toml");
+    let text = fs::read_to_string(&manifest)?;
+    fs::write(
+        manifest,
+        text.replacen("\nversion = ", "\nversion = \"0.0.0\" # ", 1),
+    )?;
+    let mut git = std::process::Command::new("git");
+    // The copy is in a directory that git ignores, so git must not look for the repository.
+    git.env("GIT_CEILING_DIRECTORIES", workspace.root.join("target"));
+    command::run(git.current_dir(&root).args(["apply", PATCH]))?;
+    let shared = format!("build.build-dir={:?}", workspace.target);
+    let mut copy = workspace.with(root.join("target"), vec!["--config".to_owned(), shared]);
+    copy.root = root;
+    Ok(copy)
+}
+
+/// Returns the files of the project that git knows or would add. Cargo finds the configuration in the directory above the
+/// copy; a second one would double its flags.
+fn files(root: &Path) -> Result<Vec<PathBuf>> {
+    let mut git = std::process::Command::new("git");
+    git.current_dir(root);
+    let list =
+        command::read(git.args("ls-files -z --cached --others --exclude-standard".split(' ')))?;
+    let files = list.split_terminator('\0').map(PathBuf::from);
+    Ok(files
+        .filter(|file| !file.starts_with(".cargo") && root.join(file).is_file())
+        .collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A run without a test would pass.
+    #[test]
+    fn the_test_of_the_image_exists() {
+        let (module, name) = TEST.split_once("::").unwrap();
+        let file = format!("../tools/sim/tests/image/{module}.rs");
+        let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(file)).unwrap();
+        assert!(text.contains(&format!("fn {name}")));
+    }
+}
