@@ -33,7 +33,7 @@ MODIO_BOARDS = {
     },
 }
 
-# Codes of the modules.
+# The modules in the order of their codes. `cargo xtask docs` writes the list.
 MODIO_MODULES = ["none", "4di", "4do", "2relay", "4ai", "4ao", "2ai2ao"]
 
 # The board of the machine.

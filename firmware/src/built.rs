@@ -1,7 +1,7 @@
 //! The commit that the firmware was built from.
 
 /// Eight digits, and `-dirty` when the sources had other changes; `unknown` outside a git repository.
-const TEXT: &str = commit::commit!();
+const TEXT: &str = register_map::commit!();
 
 /// First 32 bits of the commit; 0 when it is not known.
 pub const COMMIT: u32 = match TEXT.split_at_checked(8) {

@@ -5,11 +5,11 @@ use crate::block::block;
 use crate::codes::{
     AirRate, Baud, CommSource, Command, Format, GapRule, Lora, Mode, Power, Scale, Signal,
 };
+use crate::kind::Kind::{BitOutput, WordInput, WordOutput};
 use crate::limits::{
     BETA_DEFAULT, BETA_MAX, BETA_MIN, DEBOUNCE_DEFAULT_MS, DEBOUNCE_MAX_MS, LOW_PASS_DEFAULT,
     LOW_PASS_MAX, RAW_MAX,
 };
-use crate::points::Kind::{BitOutput, WordInput, WordOutput};
 use crate::rule::{Narrower, Rule};
 use crate::value::{Unit, Value};
 use crate::values::Values;

@@ -27,9 +27,11 @@
 mod block;
 pub mod board;
 pub mod codes;
+mod commit;
 pub mod configuration;
 pub mod counters;
 pub mod fault;
+mod kind;
 pub mod limits;
 mod module;
 pub mod part;
@@ -44,6 +46,8 @@ mod values;
 
 pub use block::{Block, Scope, Text};
 pub use board::Board;
+#[doc(hidden)]
+pub use git_version::git_version;
 pub use module::{Module, UnknownModule};
 pub use rule::{Access, InForce, Narrower, Rule, Run, Runs, rule_at, runs};
 pub use value::{Unit, Value};

@@ -3,16 +3,17 @@
 use core::fmt;
 use core::str::FromStr;
 
-use crate::points::Kind::{self, BitInput, BitOutput, WordInput, WordOutput};
+use crate::kind::Kind::{self, BitInput, BitOutput, WordInput, WordOutput};
 
-/// Declares the modules: one row for each with its code, its name, and the kinds of the four points of its port.
+/// Declares the modules: one row for each with its description, its code, its name, and the kinds of the four points of
+/// its port.
 macro_rules! modules {
-    ($($(#[doc = $doc:literal])+ $variant:ident = $code:literal $name:literal $points:expr;)+) => {
+    ($(#[doc = $about:literal] $variant:ident = $code:literal $name:literal $points:expr;)+) => {
         /// The module in a slot: the value of a MODULE register, and a name for `--module`.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
         #[repr(u8)]
         pub enum Module {
-            $($(#[doc = $doc])+ $variant = $code,)+
+            $(#[doc = $about] $variant = $code,)+
         }
 
         impl Module {
@@ -45,6 +46,14 @@ macro_rules! modules {
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Self::$variant => $name,)+
+                }
+            }
+
+            /// Returns what the module is, for people.
+            #[must_use]
+            pub const fn about(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $about.trim_ascii(),)+
                 }
             }
         }

@@ -7,22 +7,8 @@ use crate::rule::Rule;
 use crate::value::{Unit, Value};
 use crate::values::Values;
 
+pub use crate::kind::Kind;
 pub use crate::port::{CHANNELS, COUNT, PORTS, first, of_port};
-
-/// The kind of a point, which its module determines.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// There is no point at the address.
-    None,
-    /// A digital input.
-    BitInput,
-    /// A digital output.
-    BitOutput,
-    /// An analog input.
-    WordInput,
-    /// An analog output.
-    WordOutput,
-}
 
 /// Returns the values that a master may write to an analog output: 0-4095 raw, 0-10000 mV or 4000-20000 uA.
 ///

@@ -1,6 +1,6 @@
 //! The rules of registers as numbers, which is all that the firmware needs.
 
-use crate::points::Kind;
+use crate::kind::Kind;
 use crate::values::Values;
 
 /// How a master may access a register.

@@ -69,7 +69,7 @@ const CONFIGURATION: &[Expected] = &[
     (0x0107, 1, &[0, 1], &[2], 0, RESTART),
     (0x0108, 1, &[1, 2, 3, 4, 5, 6], &[0, 7, 0xB007, 0xFFFF], 0, NOW),
     (0x0109, 1, &[0, 1, 2, 3], &[4, 0xFFFF], 0, NOW),
-    (0x0110, 8, &[0, 6], &[7, 0xFFFF], 0, RESTART),
+    (0x0110, 8, &[0, Module::LAST], &[Module::LAST + 1, 0xFFFF], 0, RESTART),
     (0x0120, 32, &[0, 1000], &[1001, 0xFFFF], 5, NOW),
     (0x0140, 1, &[0, 1, 2], &[3], 0, RESTART),
     (0x0141, 1, &[0, 0xFFFF], &[], 0, RESTART),
@@ -134,24 +134,5 @@ fn spans_are_the_addresses_of_the_rules_with_adjacent_ones_joined() {
     for (rules, spans) in blocks {
         let of_rules = rules.iter().flat_map(|rule| rule.addresses());
         assert!(of_rules.eq(spans.iter().cloned().flatten()));
-    }
-}
-
-#[test]
-fn a_module_defines_the_kinds_of_its_points() {
-    use points::Kind::{BitInput, BitOutput, None, WordInput, WordOutput};
-    for (module, kinds) in [
-        (Module::None, [None; 4]),
-        (Module::Di4, [BitInput; 4]),
-        (Module::Do4, [BitOutput; 4]),
-        (Module::Relay2, [BitInput, BitInput, BitOutput, BitOutput]),
-        (Module::Ai4, [WordInput; 4]),
-        (Module::Ao4, [WordOutput; 4]),
-        (
-            Module::Ai2Ao2,
-            [WordInput, WordInput, WordOutput, WordOutput],
-        ),
-    ] {
-        assert_eq!(module.points(), kinds, "{module}");
     }
 }

@@ -75,9 +75,10 @@ class Peripheral:
 
 
 def commands(machine):
-    """Returns the functions of commands.py for a machine."""
+    """Returns the functions and the modules of commands.py for a machine."""
     path = RENODE / "commands.py"
     monitor = types.SimpleNamespace(Machine=machine)
     scope = {"monitor": monitor}
     exec(compile(path.read_text(encoding="utf-8"), str(path), "exec"), scope)
-    return types.SimpleNamespace(**{name: value for name, value in scope.items() if name.startswith("mc_")})
+    public = {name: value for name, value in scope.items() if name.startswith("mc_") or name == "MODIO_MODULES"}
+    return types.SimpleNamespace(**public)

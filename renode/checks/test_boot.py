@@ -236,7 +236,7 @@ class Boot(unittest.TestCase):
         self.assertIn("SW01 shows 0", self.board(dip=0).log())
 
     def test_every_module_is_set_up(self):
-        for module in ("none", "4di", "4do", "2relay", "4ai", "4ao", "2ai2ao"):
+        for module in commands(None).MODIO_MODULES:
             self.assertIn(f"slot {self.port()}: {module}\n", self.board(module).log())
 
     def test_every_slot_is_set_up(self):

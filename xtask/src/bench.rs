@@ -11,7 +11,7 @@ use register_map::Board;
 use serde_json::Value;
 
 use crate::workspace::{self, Workspace};
-use crate::{build, command, image, size};
+use crate::{build, command, image, peers, size};
 
 mod figures;
 #[cfg(test)]
@@ -19,9 +19,8 @@ mod pages;
 mod server;
 mod table;
 
-/// The servers on other crates, a separate workspace.
-pub const RIVALS: &str = "tools/bench/rivals/Cargo.toml";
-const RIVAL_NAMES: [&str; 2] = ["rmodbus", "modbus-core"];
+/// The servers on other crates.
+const RIVALS: [&str; 2] = ["rmodbus", "modbus-core"];
 
 /// What to measure and how to report it.
 #[derive(clap::Args, Clone, Debug)]
@@ -71,7 +70,7 @@ fn measure(workspace: &mut Workspace, board: &Board) -> Result<Value> {
     let rivals = workspace::artifacts(build.arg("--quiet"))?;
     let mut program = Command::new(workspace.program("modio-bench")?);
     program.arg(&elf).args(["--board", board.name, "--rivals"]);
-    for name in RIVAL_NAMES {
+    for name in RIVALS {
         program.arg(workspace::executable(&rivals, name)?);
     }
     let report = serde_json::from_str(&command::read(&mut program)?);
@@ -85,7 +84,13 @@ fn measure(workspace: &mut Workspace, board: &Board) -> Result<Value> {
 pub fn rivals(workspace: &mut Workspace, subcommand: &str) -> Result<Command> {
     let target = workspace.target.join("rivals");
     let mut cargo = workspace.target_cargo(subcommand)?;
-    cargo.args(["--release", "--manifest-path", RIVALS]);
+    cargo.args([
+        "--release",
+        "--manifest-path",
+        peers::MANIFEST,
+        "--package",
+        "rivals",
+    ]);
     cargo.arg("--target-dir").arg(target);
     Ok(cargo)
 }

@@ -49,7 +49,7 @@ const TAG: &str = concat!("v", env!("CARGO_PKG_VERSION"));
 /// `cargo xtask dist`.
 pub fn run(workspace: &Workspace, options: &Options) -> Result<()> {
     if let Some(tag) = &options.tag {
-        check_tag(tag, commit::commit!())?;
+        check_tag(tag, register_map::commit!())?;
     }
     let standard = workspace.target.join("dist");
     if options.out.is_none() {

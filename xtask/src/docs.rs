@@ -1,7 +1,9 @@
-//! `cargo xtask docs`: `docs/register-map.md`, written from the registers' own data so that it cannot say anything else.
+//! `cargo xtask docs`: `docs/register-map.md`, written from the registers' own data so that it cannot say anything else,
+//! and the list of modules in `renode/commands.py`.
 
 use std::fmt::{Result, Write};
 use std::ops::Range;
+use std::path::{Path, PathBuf};
 
 use register_map::points::Kind;
 use register_map::{
@@ -64,11 +66,24 @@ The record survives every reset but a loss of power. A new fault replaces it. Li
 stop at 65535.
 ";
 
-/// The document, in the repository.
-pub const PATH: &str = "docs/register-map.md";
+/// Returns the files that this command writes, each with its text.
+pub fn files(root: &Path) -> anyhow::Result<[(PathBuf, String); 2]> {
+    const MODULES: &str = "MODIO_MODULES = ";
+    let commands = root.join("renode/commands.py");
+    let text = fs_err::read_to_string(&commands)?;
+    let lines = text.split_inclusive('\n').map(|line| {
+        if line.starts_with(MODULES) {
+            format!("{MODULES}{:?}\n", Module::ALL.map(Module::name))
+        } else {
+            line.to_owned()
+        }
+    });
+    let document = root.join("docs/register-map.md");
+    Ok([(document, markdown()?), (commands, lines.collect())])
+}
 
 /// Returns the whole document.
-pub fn markdown() -> std::result::Result<String, std::fmt::Error> {
+fn markdown() -> std::result::Result<String, std::fmt::Error> {
     let mut text = String::new();
     write_markdown(&mut text)?;
     Ok(text)
@@ -317,15 +332,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_document_is_up_to_date() {
-        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
-            .join("..")
-            .join(PATH);
-        let written = fs_err::read_to_string(path).unwrap_or_default();
-        assert!(
-            written == markdown().unwrap(),
-            "{PATH} is out of date or missing; write it with: cargo xtask docs"
-        );
+    fn the_files_are_up_to_date() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        for (path, text) in files(&root).unwrap() {
+            let written = fs_err::read_to_string(&path).unwrap_or_default();
+            assert!(
+                written == text,
+                "{} is out of date or missing; write it with: cargo xtask docs",
+                path.display()
+            );
+        }
     }
 
     #[test]

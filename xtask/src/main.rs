@@ -47,7 +47,7 @@ mod workspace;
 
 /// The command line of `cargo xtask`.
 #[derive(Parser, Debug)]
-#[command(name = "cargo xtask", bin_name = "cargo xtask", version = commit::version!(), about, long_about = None)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask", version = register_map::version!(), about, long_about = None)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -66,7 +66,16 @@ enum Command {
     /// Debug the image with GDB, on the board at the debug probe, or without one in the simulator
     Gdb(debug::GdbOptions),
     /// Build the image and run it on the virtual board
-    Sim(Box<sim_options::Options>),
+    #[command(disable_help_flag = true)]
+    Sim {
+        /// Options of modio-sim; --help lists them
+        #[arg(
+            value_name = "OPTIONS",
+            trailing_var_arg = true,
+            allow_hyphen_values = true
+        )]
+        arguments: Vec<OsString>,
+    },
     /// Run the steps that a change must pass, or those named
     Test(test::Options),
     /// Run the steps of CI: formatting, lints, documentation, those of `test` and longer ones
@@ -99,7 +108,7 @@ enum Command {
     /// Run the conformance suite at every rate and format of the register map, in simulation, with another module for
     /// each rate
     Matrix(soak::Matrix),
-    /// Renew docs/register-map.md
+    /// Renew docs/register-map.md and the list of modules in renode/commands.py
     Docs,
     /// Take the pictures of the simulator's page in docs/images
     Screenshots,
@@ -110,7 +119,7 @@ fn main() -> ExitCode {
     let done = match Cli::try_parse() {
         Ok(cli) => run(cli),
         Err(error) if error.use_stderr() && error.kind() != NoCommand => {
-            Err(error::usage(sim_options::one_line(&error)))
+            Err(error::usage(error::one_line(&error)))
         }
         Err(help) => help.exit(),
     };
@@ -132,7 +141,7 @@ fn run(cli: Cli) -> Result<()> {
         Command::Run(options) => debug::run(workspace, &options),
         Command::Attach(options) => debug::attach(workspace, &options),
         Command::Gdb(options) => debug::gdb(workspace, &options),
-        Command::Sim(options) => sim::run(workspace, &options, std::env::args_os().skip(2)),
+        Command::Sim { arguments } => sim::run(workspace, &arguments),
         Command::Test(options) => test::run(workspace, &options),
         Command::Ci(options) => test::ci(workspace, &options),
         Command::Size(options) => size::run(workspace, &options),
@@ -151,9 +160,10 @@ fn run(cli: Cli) -> Result<()> {
         Command::Soak(options) => soak::run(workspace, &options),
         Command::Matrix(options) => soak::matrix(workspace, &options),
         Command::Docs => {
-            let path = workspace.root.join(docs::PATH);
-            fs_err::write(&path, docs::markdown()?)?;
-            say!("wrote {}", path.display());
+            for (path, text) in docs::files(&workspace.root)? {
+                fs_err::write(&path, text)?;
+                say!("wrote {}", path.display());
+            }
             Ok(())
         }
         Command::Screenshots => python::screenshots(workspace),
@@ -169,7 +179,7 @@ mod tests {
         use clap::CommandFactory;
         Cli::command().debug_assert();
         let error = Cli::try_parse_from(["xtask", "build", "--board", "nucleo"]).unwrap_err();
-        let text = sim_options::one_line(&error);
+        let text = error::one_line(&error);
         assert!(
             text.contains("'nucleo'") && text.contains("one of modio-02, modio-08"),
             "{text}"
@@ -177,13 +187,18 @@ mod tests {
     }
 
     #[test]
-    fn every_argument_of_hil_is_passed_on_unchanged() {
+    fn every_argument_of_hil_and_sim_is_passed_on_unchanged() {
         let arguments = ["--bench", "b.toml", "-h", "--help", "--version", "--", "x"];
-        let all = ["xtask", "hil"].iter().chain(&arguments);
-        let Command::Hil { arguments: passed } = Cli::try_parse_from(all).unwrap().command else {
-            panic!("another command");
-        };
-        assert_eq!(passed, arguments);
+        for name in ["hil", "sim"] {
+            let command = ["xtask", name];
+            let all = command.iter().chain(&arguments);
+            let (Command::Hil { arguments: passed } | Command::Sim { arguments: passed }) =
+                Cli::try_parse_from(all).unwrap().command
+            else {
+                panic!("another command");
+            };
+            assert_eq!(passed, arguments);
+        }
     }
 }
 

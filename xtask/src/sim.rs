@@ -1,36 +1,30 @@
-//! `cargo xtask sim`: builds the images and the simulator, then replaces this process with the simulator.
+//! `cargo xtask sim`: builds the simulator and the images that it needs, then replaces this process with the simulator.
 
 use std::ffi::OsString;
 use std::process::Command;
 
 use anyhow::Result;
 use register_map::Board;
-use sim_options::Options;
 
-use crate::error::usage;
 use crate::workspace::Workspace;
 use crate::{build, command};
 
-/// `cargo xtask sim`. The `arguments` have already been parsed into `options`, so that a wrong one is refused before
-/// the build.
-pub fn run(
-    workspace: &mut Workspace,
-    options: &Options,
-    arguments: impl IntoIterator<Item = OsString>,
-) -> Result<()> {
-    options.check_line().map_err(usage)?;
-    if let Some((_, elf)) = options.elf.iter().find(|(_, elf)| !elf.is_file()) {
-        return Err(usage(format!("there is no image {}", elf.display())));
+/// `cargo xtask sim`. The simulator alone knows its options. It names the boards whose image is missing; with a wrong
+/// option it names none, and reports the error when it is started.
+pub fn run(workspace: &mut Workspace, arguments: &[OsString]) -> Result<()> {
+    let program = workspace.simulator()?;
+    let mut simulator = Command::new(&program);
+    simulator.args(arguments);
+    let asked = command::output(
+        Command::new(program)
+            .args(arguments)
+            .arg("--missing-images"),
+    )?;
+    let lines = String::from_utf8_lossy(&asked.stdout);
+    for board in lines.lines().filter_map(|name| name.parse().ok()) {
+        let board: &Board = board;
+        let elf = build::image(workspace, board)?;
+        simulator.arg(format!("--elf={board}={}", elf.display()));
     }
-    let fittings = options.fittings().map_err(usage)?;
-    let mut built = Vec::new();
-    for board in Board::ALL {
-        let wanted = fittings.iter().any(|fitting| fitting.board == board);
-        if wanted && options.elf_of(board).is_none() {
-            let elf = build::image(workspace, board)?;
-            built.push(format!("--elf={}={}", board.name, elf.display()));
-        }
-    }
-    let mut simulator = Command::new(workspace.simulator()?);
-    command::exec(simulator.args(arguments).args(built))
+    command::exec(&mut simulator)
 }

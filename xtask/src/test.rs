@@ -28,7 +28,7 @@ const SUITE: &str = "hil/sim";
 const TARGET_PACKAGES: &str = "firmware board-support modio-drivers modbus-server register-map";
 
 /// The workspaces of this project.
-const WORKSPACES: [&str; 4] = ["Cargo.toml", fuzz::MANIFEST, bench::RIVALS, peers::MANIFEST];
+const WORKSPACES: [&str; 3] = ["Cargo.toml", fuzz::MANIFEST, peers::MANIFEST];
 
 /// The tests of the modio-08 that run at the corners: those of the board itself, its start and its store. The other
 /// tests run the same code as on the modio-02, and would double the time.
@@ -53,12 +53,11 @@ enum Run {
 
 /// The steps in the order in which they run: command, name, description, function. The names do not change. A step that
 /// runs for each board has the board's number at the end of its name, such as `lint-02`.
-const STEPS: [(In, &str, &str, Run); 22] = [
+const STEPS: [(In, &str, &str, Run); 21] = [
     (Ci, "fmt", "formatting", Once(formatting)),
     (Ci, "lint-host", "lints, host", Once(lint_host)),
     (Ci, "lint", "lints, target", Each(lint_target)),
     (Ci, "lint-fuzz", "lints, fuzz targets", Once(lint_fuzz)),
-    (Ci, "lint-rivals", "lints, rivals", Once(lint_rivals)),
     (Ci, "lint-peers", "lints, peers", Once(lint_peers)),
     (Ci, "doc-host", "documentation, host", Once(doc_host)),
     (Ci, "doc", "documentation, target", Each(doc_target)),
@@ -219,12 +218,9 @@ fn lint_fuzz(workspace: &mut Workspace) -> Result<()> {
     deny_warnings(workspace.other("clippy", fuzz::MANIFEST, "fuzz"))
 }
 
-fn lint_rivals(workspace: &mut Workspace) -> Result<()> {
-    deny_warnings(bench::rivals(workspace, "clippy")?)
-}
-
 fn lint_peers(workspace: &mut Workspace) -> Result<()> {
-    deny_warnings(workspace.other("clippy", peers::MANIFEST, "peers"))
+    deny_warnings(workspace.other("clippy", peers::MANIFEST, "peers"))?;
+    deny_warnings(bench::rivals(workspace, "clippy")?)
 }
 
 fn documentation(mut cargo: Command) -> Result<()> {

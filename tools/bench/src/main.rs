@@ -9,7 +9,7 @@ use sim::Image;
 
 /// Measures the release image on the virtual board and prints the figures as JSON
 #[derive(Parser)]
-#[command(name = "modio-bench", version = commit::version!())]
+#[command(name = "modio-bench", version = register_map::version!())]
 struct Cli {
     /// The image
     elf: PathBuf,

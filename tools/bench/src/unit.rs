@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use register_map::codes::Mode;
 use register_map::{Board as Map, Module, configuration};
 use sim::board::Layout;
-use sim::line::{Format, Settings};
+use sim::line::{Format, Settings, frame_silence};
 use sim::{Board, Config, Corner, Image, Time};
 
 use crate::framing::{adu, is_adu};
@@ -124,7 +124,7 @@ impl Unit {
         let start = self.board.now().max(self.free);
         let end = self.board.line().send(start, adu);
         let late = end + self.silence();
-        self.board.run_until(end + self.settings.frame_silence());
+        self.board.run_until(end + frame_silence(self.settings));
         let step = self.settings.rate().bits(1);
         while !self.board.driver_enable() && self.board.now() < late {
             self.board.run_for(step);
@@ -132,12 +132,12 @@ impl Unit {
         while self.board.driver_enable() {
             self.board.run_for(step);
         }
-        self.free = self.board.now() + self.settings.frame_silence();
+        self.free = self.board.now() + frame_silence(self.settings);
         self.received()
     }
 
     fn silence(&self) -> Time {
-        self.settings.frame_silence() + ANSWER
+        frame_silence(self.settings) + ANSWER
     }
 
     fn received(&mut self) -> Vec<u8> {
@@ -179,7 +179,7 @@ impl Unit {
     fn count(&mut self, pdu: &[u8]) -> Result<Cost, String> {
         let now = self.board.now();
         let end = self.board.line().send(now, &adu(self.mode, pdu));
-        let expiry = end + self.settings.frame_silence();
+        let expiry = end + frame_silence(self.settings);
         let mut cost = Cost::default();
         let mut handler = Handler::default();
         let mut expired = false;

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use anyhow::{Context as _, Result, bail, ensure};
 use clap::Parser;
+use modbus_line::{Format, LineFormat};
 
 use crate::bench::Patience;
 use crate::case::{Case, Kind};
@@ -12,7 +13,6 @@ use crate::endpoint::Endpoint;
 use crate::endpoint::exact_line;
 use crate::endpoint::stream::Stream;
 use crate::frame::Mode;
-use crate::line::{CharacterFormat, LineFormat};
 use crate::profile::Profile;
 use crate::program::Files;
 
@@ -54,7 +54,7 @@ pub struct Cli {
 
     /// The module in the simulated board's slot at a port, such as 3=4ai; may be repeated
     #[cfg(feature = "sim")]
-    #[arg(long = "slot", value_name = "PORT=MODULE", value_parser = sim_options::slot, conflicts_with_all = ["serial", "tcp", "exact_line"])]
+    #[arg(long = "slot", value_name = "PORT=MODULE", value_parser = sim::options::slot, conflicts_with_all = ["serial", "tcp", "exact_line"])]
     pub slots: Vec<(u8, register_map::Module)>,
 
     /// The simulated board's DIP switch: its unit address
@@ -68,12 +68,12 @@ pub struct Cli {
     pub set: Vec<(u16, u16)>,
 
     /// The line's rate in bit/s
-    #[arg(long, value_name = "RATE", default_value_t = 9600, value_parser = clap::value_parser!(u32).range(300..=4_000_000))]
+    #[arg(long, value_name = "RATE", default_value_t = 9600, value_parser = clap::value_parser!(u32).range(modbus_line::RATES))]
     pub baud: u32,
 
     /// The line's format: data bits, parity, stop bits
     #[arg(long, value_name = "FORMAT", default_value = "8N2")]
-    pub format: CharacterFormat,
+    pub format: Format,
 
     /// The unit's address [default: the profile's, the DIP switch, or 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..))]

@@ -1,10 +1,10 @@
-//! Frames of the serial line, RTU and ASCII (Modbus over Serial Line V1.02, 2.5), by the crate `modbus-frames`. The
+//! Frames of the serial line, RTU and ASCII (Modbus over Serial Line V1.02, 2.5), by the crate `modbus-line`. The
 //! server under test does not use that crate, so a mistake in the server's own codec does not hide in its test.
 
 use std::fmt;
 
-use modbus_frames::adu::{Framing, bytes};
-pub use modbus_frames::adu::{crc, lrc};
+use modbus_line::adu::{Framing, bytes};
+pub use modbus_line::adu::{crc, lrc};
 
 /// The form of a frame on the line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -26,7 +26,6 @@ pub mod cli;
 pub mod endpoint;
 pub mod frame;
 pub mod interrupt;
-pub mod line;
 pub mod points;
 pub mod probe;
 pub mod profile;

@@ -13,7 +13,7 @@ use conformance::target::{Support, Target};
 use conformance::{interrupt, program};
 
 fn main() -> ExitCode {
-    program::run("modio-conformance", commit::version!(), test)
+    program::run("modio-conformance", register_map::version!(), test)
 }
 
 /// Tests the unit, and returns the exit status.

@@ -2,13 +2,13 @@
 
 use std::time::Duration;
 
+use modbus_line::LineFormat;
 use register_map::codes::{Command, Format};
 use register_map::configuration::{BAUD, COMMAND, SAVE_EVERY_S};
 
 use crate::bench::Bench;
 use crate::case::{Check, Stop, skip};
 use crate::frame::{Reply, hex};
-use crate::line::LineFormat;
 use crate::points::{pdu, write_words};
 
 /// Time for the unit to store its configuration.
@@ -146,7 +146,7 @@ fn move_to(bench: &mut Bench<'_>, to: LineFormat) -> Check {
 
 /// The value of the register FORMAT for a format; [`Stop::Skip`] when the device does not have the format.
 fn format_code(line: LineFormat) -> Check<u16> {
-    let name = line.format().to_string();
+    let name = line.format.to_string();
     let known = Format::NAMES.iter().find(|(_, known)| *known == name);
     known
         .map(|(code, _)| *code)

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use modbus_line::Parity;
 use register_map::codes::Command;
 use register_map::configuration::COMMAND;
 
@@ -9,7 +10,6 @@ use crate::bench::{Bench, Patience};
 use crate::case::{Case, Failure, Need, Stop};
 use crate::endpoint::{Broken, Endpoint};
 use crate::frame::Mode;
-use crate::line::Parity;
 use crate::points::pdu;
 use crate::target::{Support, Target};
 
@@ -195,7 +195,7 @@ fn lacking(
         ),
         Need::Faults => (able.faults, "the endpoint cannot send damaged characters"),
         Need::Parity => (
-            endpoint.line().parity != Parity::None,
+            endpoint.line().format.parity != Parity::None,
             "the line has no parity",
         ),
         Need::Power => (able.power, "the endpoint cannot switch the power"),

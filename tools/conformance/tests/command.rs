@@ -25,8 +25,8 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use conformance::frame::Mode;
-use conformance::line::LineFormat;
 use fault::Fault;
+use modbus_line::LineFormat;
 use unit::{Character, Unit};
 
 const PROFILE: &str = r#"
@@ -184,7 +184,7 @@ fn run_that_cannot_test_gives_status_2_and_one_line() {
     for (arguments, part) in [
         (&[][..], "--serial PORT"),
         (&["--tcp", &nowhere], "cannot connect"),
-        (&["--serial", "/dev/no-such-port"], "not there"),
+        (&["--serial", "/dev/no-such-port"], "there is no port"),
         (
             &["--tcp", &silent, "--unit", "77", "--patience", "50"],
             "does not answer",

@@ -33,12 +33,11 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
 
+use modbus_line::{Format, RATES};
 use register_map::{Module, points};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
 use toml::Spanned;
-
-use conformance::line::CharacterFormat;
 
 /// The contents of a bench file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -52,7 +51,7 @@ pub struct BenchFile {
     /// Rate of the line, in bit/s.
     pub baud: Option<u32>,
     /// Format of the line.
-    pub format: Option<CharacterFormat>,
+    pub format: Option<Format>,
     /// The module that must be in the first slot.
     pub module: Option<Module>,
     /// Switches the unit's power, followed by `off` or `on`.
@@ -130,7 +129,7 @@ struct File {
     #[serde(default, deserialize_with = "baud")]
     baud: Option<u32>,
     #[serde(default, deserialize_with = "text")]
-    format: Option<CharacterFormat>,
+    format: Option<Format>,
     #[serde(default, deserialize_with = "text")]
     module: Option<Module>,
     power_cmd: Option<String>,
@@ -202,7 +201,7 @@ fn point<'de, D: Deserializer<'de>>(from: D) -> Result<u16, D::Error> {
 
 fn baud<'de, D: Deserializer<'de>>(from: D) -> Result<Option<u32>, D::Error> {
     match i64::deserialize(from)? {
-        baud @ 300..=4_000_000 => Ok(Some(baud as u32)),
+        baud if RATES.contains(&baud) => Ok(Some(baud as u32)),
         other => Err(D::Error::custom(format!(
             "baud = {other} is not 300 to 4000000"
         ))),

@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Parser;
+use modbus_line::Format;
 use register_map::Module;
 use register_map::codes::Baud;
 
-use conformance::line::CharacterFormat;
 use conformance::program::Files;
 
 /// Tests a modio on a bench: the conformance suite, the turnaround and lost frames at each rate, and the wires from
@@ -56,12 +56,12 @@ pub struct Cli {
     pub unit: Option<u8>,
 
     /// The line's rate in bit/s [default: 9600]
-    #[arg(long, value_name = "RATE", value_parser = clap::value_parser!(u32).range(300..=4_000_000))]
+    #[arg(long, value_name = "RATE", value_parser = clap::value_parser!(u32).range(modbus_line::RATES))]
     pub baud: Option<u32>,
 
     /// The line's format: 8N2, 8E1, 8O1 or 8N1 [default: 8N2]
     #[arg(long, value_name = "FORMAT")]
-    pub format: Option<CharacterFormat>,
+    pub format: Option<Format>,
 
     /// The module that must be in the unit's first slot [default: any]
     #[arg(long, value_name = "NAME")]

@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use modbus_line::{LineFormat, Parity};
 use register_map::board::MODIO_02;
 use register_map::configuration::{BAUD, COMMAND, FORMAT, KEY};
 use register_map::{Module, counters, points, state};
 
 use conformance::endpoint::{Abilities, Broken, Endpoint, Piece, Received};
 use conformance::frame::Mode;
-use conformance::line::{LineFormat, Parity};
 
 /// One unit.
 pub(super) struct Unit {
@@ -76,7 +76,8 @@ impl Unit {
                     }
                     2 => {
                         self.line.baud = u32::from(self.stored[0]) * 100;
-                        (self.line.parity, self.line.stop_bits) = match self.stored[1] {
+                        (self.line.format.parity, self.line.format.stop_bits) = match self.stored[1]
+                        {
                             1 => (Parity::Even, 1),
                             _ => (Parity::None, 2),
                         };

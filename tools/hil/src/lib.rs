@@ -18,13 +18,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use anyhow::{Context as _, Error, Result, bail};
+use modbus_line::LineFormat;
 use register_map::{Module, state};
 
 use conformance::bench::{Bench, Patience};
 use conformance::case::{Case, Check, Stop, skip};
 use conformance::endpoint::Endpoint;
 use conformance::frame::Mode;
-use conformance::line::LineFormat;
 use conformance::probe::{Given, probe};
 use conformance::rate::tour;
 use conformance::report::table;

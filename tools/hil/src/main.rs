@@ -9,7 +9,7 @@ use hil::report::Report;
 use hil::shell;
 
 fn main() -> ExitCode {
-    program::run("modio-hil", commit::version!(), test)
+    program::run("modio-hil", register_map::version!(), test)
 }
 
 /// Prepares the board and tests it. Returns the exit status.
@@ -27,7 +27,7 @@ fn test(cli: &Cli) -> anyhow::Result<u8> {
     }
     let stop = interrupt::catch()?;
     let mut report = Report {
-        about: About::here(setup.port(), commit::commit!()),
+        about: About::here(setup.port(), register_map::commit!()),
         ..Report::default()
     };
     let mut print = |line: &str| program::say(line);

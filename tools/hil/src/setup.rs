@@ -4,6 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use anyhow::{Context as _, Result, anyhow, bail};
+use modbus_line::LineFormat;
 
 use crate::Plan;
 use crate::bench_file::BenchFile;
@@ -13,7 +14,6 @@ use conformance::case::Case;
 use conformance::cli::{chosen, waits};
 use conformance::endpoint::stream::Stream;
 use conformance::endpoint::{Broken, Endpoint};
-use conformance::line::LineFormat;
 
 /// The command line and the bench file, merged.
 #[derive(Clone, Debug)]
@@ -45,7 +45,7 @@ impl Cli {
         if setup.port().is_none() && self.tcp.is_none() {
             bail!("no serial port: name it with --port, or in the bench file");
         }
-        let format = setup.line().format().to_string();
+        let format = setup.line().format.to_string();
         if !["8N2", "8E1", "8O1", "8N1"].contains(&format.as_str()) {
             bail!("a modio has no format {format}: use 8N2, 8E1, 8O1 or 8N1");
         }
@@ -70,7 +70,7 @@ impl Setup {
         let format = self.cli.format.or(self.file.format);
         LineFormat::new(
             self.cli.baud.or(self.file.baud).unwrap_or(usual.baud),
-            format.unwrap_or_else(|| usual.format()),
+            format.unwrap_or(usual.format),
         )
     }
 

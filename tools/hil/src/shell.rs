@@ -6,9 +6,9 @@ use std::time::Duration;
 
 use anyhow::{Context as _, Result, ensure};
 use delegate::delegate;
+use modbus_line::LineFormat;
 
 use conformance::endpoint::{Abilities, Broken, Endpoint, Piece, Received};
-use conformance::line::LineFormat;
 
 /// How the image is written.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -9,13 +9,14 @@ use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use modbus_line::LineFormat;
+
 use crate::spread::Spread;
 use conformance::bench::Bench;
 use conformance::case::{Check, Failure};
 use conformance::cases::timing::silence;
 use conformance::endpoint::Piece;
 use conformance::frame::Reply;
-use conformance::line::LineFormat;
 use conformance::points::pdu;
 use conformance::run::Verdict;
 

@@ -10,9 +10,9 @@ use std::time::Duration;
 use conformance::cli::{chosen, waits};
 use conformance::endpoint::Endpoint as _;
 use conformance::endpoint::sim::{Fitting, start};
-use conformance::line::LineFormat;
 use hil::report::Report;
 use hil::{Plan, run};
+use modbus_line::LineFormat;
 use register_map::Module;
 use register_map::board::MODIO_02;
 

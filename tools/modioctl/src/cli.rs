@@ -8,6 +8,7 @@ use register_map::codes::{Baud, Format};
 
 use crate::bus::Options;
 use crate::bus::endpoint::{RATES, duration};
+use crate::export::ExportFormat;
 use crate::names::port_number;
 
 /// Finds, sets up and watches modio units over Modbus
@@ -120,7 +121,7 @@ pub struct Units(pub Vec<u8>);
 pub struct Rates(pub Vec<u32>);
 /// Formats.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Formats(pub Vec<crate::bus::format::Format>);
+pub struct Formats(pub Vec<modbus_line::Format>);
 
 fn units(text: &str) -> Result<Units, String> {
     let wrong = || format!("{text:?} is not a list of unit addresses 1 to 247, such as 1-20,40");
@@ -203,7 +204,8 @@ pub enum Module {
         /// The port of the slot, such as p5 or 5
         #[arg(id = "slot", value_name = "PORT", value_parser = port)]
         port: u8,
-        /// The module: none, 4di, 4do, 2relay, 4ai, 4ao or 2ai2ao
+        /// The name of the module
+        #[arg(help = format!("The module: {}", register_map::Module::ALL.map(register_map::Module::name).join(", ")))]
         module: String,
     },
 }
@@ -357,21 +359,6 @@ fn line_name(text: &str) -> Result<String, String> {
             "{text:?} is not a name of letters A to Z, digits, spaces and `.`, `_`, `-`, 64 at most"
         ))
     }
-}
-
-/// A system for which a configuration can be written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum ExportFormat {
-    /// A table of all points and registers
-    Csv,
-    /// The description of the unit, with the endpoint
-    Json,
-    /// YAML for the integrations modbus and template
-    HomeAssistant,
-    /// TOML for the input plugin modbus
-    Telegraf,
-    /// A flow with nodes of node-red-contrib-modbus
-    NodeRed,
 }
 
 #[cfg(test)]

@@ -9,7 +9,9 @@ use modioctl::cli::Cli;
 use modioctl::failure::Failure;
 
 fn main() -> ExitCode {
-    let arguments = Cli::command().version(commit::version!()).try_get_matches();
+    let arguments = Cli::command()
+        .version(register_map::version!())
+        .try_get_matches();
     let cli = match arguments.and_then(|arguments| Cli::from_arg_matches(&arguments)) {
         Ok(cli) => cli,
         Err(error) => match error.kind() {

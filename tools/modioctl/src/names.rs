@@ -5,7 +5,6 @@ use modio_description::{
 };
 
 use crate::failure::Failure;
-use crate::value::{allow, number_of};
 
 /// Number of points of a port.
 const CHANNELS: u16 = 4;
@@ -41,9 +40,12 @@ impl Item {
     /// Returns whether a value is allowed. Every value is when the allowed ones are not known.
     #[must_use]
     pub fn allows(&self, word: u16) -> bool {
-        self.values
-            .as_ref()
-            .is_none_or(|values| allow(values, word))
+        match &self.values {
+            None => true,
+            Some(Values::Range(min, max)) => (*min..=*max).contains(&word),
+            Some(Values::RangeOr(also, min, max)) => word == *also || (*min..=*max).contains(&word),
+            Some(Values::OneOf(values)) => values.contains(&word),
+        }
     }
 }
 
@@ -213,6 +215,18 @@ fn slug(name: &str) -> String {
     match name.split_once('.') {
         Some((port, _)) if port.parse::<u8>().is_ok() => format!("p{name}"),
         _ => name,
+    }
+}
+
+/// Parses a number from 0 to 65535, decimal or hexadecimal.
+pub fn number_of(text: &str) -> Option<u16> {
+    // The functions of the standard library also accept a sign.
+    if text.contains(['+', '-']) {
+        return None;
+    }
+    match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
+        Some(digits) => u16::from_str_radix(digits, 16).ok(),
+        None => text.parse().ok(),
     }
 }
 

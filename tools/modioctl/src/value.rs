@@ -4,7 +4,7 @@ use modio_description::{Table, Unit, Value, Values};
 use serde_json::{Value as Json, json};
 
 use crate::failure::Failure;
-use crate::names::{Item, Meaning};
+use crate::names::{Item, Meaning, number_of};
 
 /// A value as read: one or more registers, or a bit.
 #[derive(Clone, Debug, PartialEq)]
@@ -225,20 +225,8 @@ fn words(item: &Item, text: &str, raw: bool) -> Result<Vec<u16>, String> {
 fn check_raw(item: &Item, word: u16) -> Result<(), String> {
     match (&item.meaning, &item.values) {
         (Meaning::Bit, _) if word > 1 => Err("a bit is 0 or 1".to_owned()),
-        (_, Some(values)) if !allow(values, word) => Err(takes(values, &Unit::default())),
+        (_, Some(values)) if !item.allows(word) => Err(takes(values, &Unit::default())),
         _ => Ok(()),
-    }
-}
-
-/// Parses a number from 0 to 65535, decimal or hexadecimal.
-pub fn number_of(text: &str) -> Option<u16> {
-    // The functions of the standard library also accept a sign.
-    if text.contains(['+', '-']) {
-        return None;
-    }
-    match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
-        Some(digits) => u16::from_str_radix(digits, 16).ok(),
-        None => text.parse().ok(),
     }
 }
 
@@ -255,16 +243,6 @@ fn steps(text: &str, unit: &Unit) -> Option<i64> {
     let whole = steps.round();
     let near = (steps - whole).abs() < 1e-6 && whole.abs() < 1e9;
     near.then_some(whole as i64 - i64::from(unit.offset))
-}
-
-/// Returns whether a register allows a value.
-#[must_use]
-pub fn allow(values: &Values, word: u16) -> bool {
-    match values {
-        Values::Range(min, max) => (*min..=*max).contains(&word),
-        Values::RangeOr(also, min, max) => word == *also || (*min..=*max).contains(&word),
-        Values::OneOf(values) => values.contains(&word),
-    }
 }
 
 /// Describes the values that a register allows, in its unit.

@@ -9,8 +9,7 @@ use std::time::Duration;
 use modio_description::{Description, Value, describe};
 use modioctl::bus::adu::Framing;
 use modioctl::bus::{Endpoint, Place};
-use modioctl::cli::ExportFormat;
-use modioctl::export::{Line, Source, text};
+use modioctl::export::{ExportFormat, Line, Source, text};
 use modioctl::names::Book;
 use proptest::prelude::*;
 use register_map::Module;
@@ -28,7 +27,7 @@ fn endpoint(place: Place, framing: Framing) -> Endpoint {
     Endpoint {
         place,
         baud: 9600,
-        format: modioctl::bus::format::Format::default(),
+        format: modbus_line::Format::default(),
         framing,
         unit: 1,
         timeout: Duration::from_secs(1),

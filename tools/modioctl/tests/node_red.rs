@@ -9,7 +9,7 @@ use std::time::Duration;
 use modio_description::{Unit, describe};
 use modioctl::bus::adu::Framing;
 use modioctl::bus::{Endpoint, Place};
-use modioctl::cli::ExportFormat;
+use modioctl::export::ExportFormat;
 use modioctl::export::{Line, Source, text};
 use modioctl::names::Book;
 use register_map::board::MODIO_02;
@@ -33,7 +33,7 @@ fn flow(book: Book) -> Vec<Json> {
     let endpoint = Endpoint {
         place: Place::Serial("/dev/ttyUSB0".to_owned()),
         baud: 9600,
-        format: modioctl::bus::format::Format::default(),
+        format: modbus_line::Format::default(),
         framing: Framing::Rtu,
         unit: 1,
         timeout: Duration::from_secs(1),

@@ -12,10 +12,10 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use clap::Parser;
-use modbus_frames::adu::Framing;
+use modbus_line::adu::Framing;
 use register_map::configuration;
 use sim::board::MODIO_02;
-use sim::line::Settings;
+use sim::line::{Settings, frame_silence};
 use sim::radio::Parameters;
 use sim::{Board, Bus, Config, Image, Module, Time};
 
@@ -190,7 +190,7 @@ fn poll(bus: &mut Bus, unit: u8) -> bool {
         );
     }
     // The last character is received before its last stop bit ends. Wait for that and for t3.5.
-    bus.run_for(settings.frame_silence() + settings.characters(1));
+    bus.run_for(frame_silence(settings) + settings.characters(1));
     Framing::Rtu.open(&reply).is_some()
 }
 

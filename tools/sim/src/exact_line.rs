@@ -2,11 +2,12 @@
 
 use std::time::Duration;
 
-use exact_line::{Ability, Event, Hello, LONGEST_RUN, Piece, Reply, Request};
+use modbus_line::RATES;
+use modbus_line::exact::{Ability, Event, Hello, LONGEST_RUN, Piece, Reply, Request};
 
 use crate::Board;
 use crate::line::{Character, Format, Settings};
-use crate::time::Time;
+use f103::time::Time;
 
 /// What the client of a board's line knows already.
 #[derive(Clone, Debug, Default)]
@@ -203,7 +204,7 @@ fn with_low_stop(settings: Settings, byte: u8) -> Character {
 
 /// The settings of a rate and a format's name.
 fn settings(baud: u32, format: &str) -> Result<Settings, String> {
-    if !(300..=4_000_000).contains(&baud) {
+    if !RATES.contains(&baud.into()) {
         return Err(format!("{baud} bit/s is not within 300 to 4000000"));
     }
     let format = Format::named(format).ok_or_else(|| {

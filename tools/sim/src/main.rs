@@ -16,7 +16,7 @@ struct Cli {
     version: bool,
 
     #[command(flatten)]
-    options: sim_options::Options,
+    options: sim::options::Options,
 }
 
 fn main() -> ExitCode {
@@ -26,9 +26,18 @@ fn main() -> ExitCode {
             return ExitCode::SUCCESS;
         }
         Ok(cli) => cli.options,
-        Err(error) if error.use_stderr() => return refused(&sim_options::one_line(&error)),
+        Err(error) if error.use_stderr() => return refused(&sim::options::one_line(&error)),
         Err(help) => help.exit(),
     };
+    if options.missing_images {
+        return match options.boards_without_image() {
+            Ok(boards) => {
+                boards.iter().for_each(|board| println!("{board}"));
+                ExitCode::SUCCESS
+            }
+            Err(what) => refused(&what),
+        };
+    }
     match app::run(&options) {
         Ok(()) => ExitCode::SUCCESS,
         Err(what) => refused(&what),

@@ -2,12 +2,13 @@
 
 use std::time::Duration;
 
+use modbus_line::Parity;
+
 use crate::bench::{Bench, apart};
 use crate::case::{Case, Check, Need, case};
 use crate::cases::damage::one_by_one;
 use crate::endpoint::Piece;
 use crate::frame::{Reply, ascii, lrc, rtu};
-use crate::line::Parity;
 use crate::points::diagnose;
 
 const N: &[Need] = &[Need::Ascii];
@@ -99,7 +100,7 @@ fn lower_case(bench: &mut Bench<'_>) -> Check {
 
 fn damaged(bench: &mut Bench<'_>) -> Check {
     one_by_one(bench, Piece::BadStop)?;
-    if bench.endpoint.line().parity == Parity::None {
+    if bench.endpoint.line().format.parity == Parity::None {
         return Ok(());
     }
     one_by_one(bench, Piece::BadParity)

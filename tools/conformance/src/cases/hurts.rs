@@ -183,7 +183,7 @@ fn wrong_settings(bench: &mut Bench<'_>) -> Check {
         Mode::Rtu => &[4, 5, 6, 7, 255, 0xFFFF],
         Mode::Ascii => &[7, 255, 0xFFFF],
     };
-    let modes: &[u16] = match bench.endpoint.line().data_bits {
+    let modes: &[u16] = match bench.endpoint.line().format.data_bits {
         7 => &[0, 2, 0xFFFF],
         _ => &[2, 0xFFFF],
     };

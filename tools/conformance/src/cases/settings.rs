@@ -1,11 +1,11 @@
 //! Changes of the rate and format of a modio.
 
-use register_map::codes::{self, Baud, Format};
+use modbus_line::{Format, LineFormat};
+use register_map::codes::{self, Baud};
 
 use crate::bench::Bench;
 use crate::case::{Case, Check, Need, Stop, case};
 use crate::frame::Mode;
-use crate::line::{CharacterFormat, LineFormat};
 use crate::rate;
 
 const N: &[Need] = &[
@@ -52,9 +52,9 @@ fn every_format(bench: &mut Bench<'_>) -> Check {
         Mode::Rtu => codes::Mode::Rtu,
         Mode::Ascii => codes::Mode::Ascii,
     };
-    let formats: Result<Vec<CharacterFormat>, String> = Format::ALL
+    let formats: Result<Vec<Format>, String> = codes::Format::ALL
         .iter()
-        .zip(Format::NAMES)
+        .zip(codes::Format::NAMES)
         .filter(|(format, _)| format.suits(mode))
         .map(|(_, (_, name))| name.parse())
         .collect();

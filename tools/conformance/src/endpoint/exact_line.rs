@@ -3,14 +3,15 @@
 
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Write};
-use std::net::{TcpStream, ToSocketAddrs};
+use std::net::TcpStream;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use ::exact_line::{Ability, Event, Hello, LONGEST_RUN, Reply, Request, VERSION};
+use modbus_line::LineFormat;
+use modbus_line::exact::{Ability, Event, Hello, LONGEST_RUN, Reply, Request, VERSION};
 
+use super::stream::connect;
 use super::{Abilities, Broken, Endpoint, Piece, Received};
-use crate::line::LineFormat;
 
 /// Time that a server may take for a request. The longest request is ten minutes of virtual time.
 const PATIENCE: Duration = Duration::from_secs(600);
@@ -138,7 +139,7 @@ impl<T: Transport> Endpoint for ExactLine<T> {
     }
 
     fn set_line(&mut self, line: LineFormat) -> Result<(), Broken> {
-        let request = Request::Line(line.baud, line.format().to_string());
+        let request = Request::Line(line.baud, line.format.to_string());
         self.ask(&request, Some(Ability::Line))?;
         self.line = line;
         Ok(())
@@ -248,24 +249,11 @@ impl Tcp {
     }
 
     fn open(address: &str) -> Result<Self, String> {
-        let mut last = "the name has no address".to_owned();
-        let found = address.to_socket_addrs();
-        for address in
-            found.map_err(|error| format!("no address such as 127.0.0.1:3470: {error}"))?
-        {
-            match TcpStream::connect_timeout(&address, HANDOVER) {
-                Ok(stream) => {
-                    let set = stream
-                        .set_nodelay(true)
-                        .and_then(|()| stream.set_read_timeout(Some(PATIENCE)));
-                    set.map_err(|error| error.to_string())?;
-                    let stream = BufReader::new(stream);
-                    return Ok(Self { stream });
-                }
-                Err(error) => last = error.to_string(),
-            }
-        }
-        Err(last)
+        let stream = connect(address)?;
+        let set = stream.set_read_timeout(Some(PATIENCE));
+        set.map_err(|error| error.to_string())?;
+        let stream = BufReader::new(stream);
+        Ok(Self { stream })
     }
 }
 

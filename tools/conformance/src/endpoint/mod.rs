@@ -8,11 +8,11 @@ pub mod trace;
 
 use std::time::Duration;
 
-use crate::line::LineFormat;
+use modbus_line::LineFormat;
 
 /// Something to send. Where time is exact, a gap has exactly the length asked for; elsewhere it may be longer. Damaged
 /// characters, breaks and glitches need [`Abilities::faults`].
-pub use ::exact_line::Piece;
+pub use modbus_line::exact::Piece;
 
 /// A received character, with the times of the endpoint's clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

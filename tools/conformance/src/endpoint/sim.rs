@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use ::exact_line::{Reply, Request};
+use modbus_line::LineFormat;
+use modbus_line::exact::{Reply, Request};
 use register_map::codes::{Baud, Format};
 use register_map::{Module, configuration};
 use sim::board::Layout;
@@ -12,7 +13,6 @@ use sim::{Board, Config, Image, Time};
 use super::Broken;
 use super::exact_line::{ExactLine, Transport};
 use crate::frame::Mode;
-use crate::line::LineFormat;
 
 /// Time that the unit has to start after power-on.
 const START: Time = Time::from_ms(150);
@@ -83,7 +83,7 @@ pub fn start(fitting: &Fitting) -> Result<ExactLine<InProcess>, Broken> {
         board,
         session: Session::default(),
     };
-    let line = Request::Line(fitting.line.baud, fitting.line.format().to_string());
+    let line = Request::Line(fitting.line.baud, fitting.line.format.to_string());
     server.ask(&line).map_err(Broken)?;
     ExactLine::new(server)
 }
@@ -112,7 +112,7 @@ fn line_settings(line: LineFormat) -> Result<[(u16, u16); 2], Broken> {
         .iter()
         .find(|baud| baud.bits_per_second() == line.baud)
         .ok_or_else(|| Broken(format!("the device has no rate of {} bit/s", line.baud)))?;
-    let name = line.format().to_string();
+    let name = line.format.to_string();
     let format = Format::NAMES
         .iter()
         .find(|(_, known)| *known == name)

@@ -6,10 +6,11 @@ use std::path::Path;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use serial2::{CharSize, FlowControl, Parity as SerialParity, SerialPort, Settings, StopBits};
+use modbus_line::LineFormat;
+use modbus_line::port::Port;
+use serial2::{IntoSettings as _, SerialPort};
 
 use super::{Abilities, Broken, Endpoint, Piece, Received};
-use crate::line::{LineFormat, Parity};
 
 /// Longest time that one read waits, before the clock is read again.
 const SLICE: Duration = Duration::from_millis(5);
@@ -21,9 +22,12 @@ const SILENCE: Duration = Duration::from_millis(100);
 const LONGEST: usize = 513;
 const GRACE: Duration = Duration::from_secs(2);
 
+/// Time limit for connecting to one address.
+const CONNECTING: Duration = Duration::from_secs(5);
+
 /// The connection.
 enum Carrier {
-    Serial(SerialPort),
+    Serial(Port<SerialPort>),
     Tcp(TcpStream),
 }
 
@@ -42,22 +46,7 @@ impl Stream {
     ///
     /// When the port cannot be opened, or does not support the format.
     pub fn serial(path: &Path, line: LineFormat) -> Result<Self, Broken> {
-        let port = SerialPort::open(path, |settings: Settings| configured(settings, line)).map_err(
-            |error| {
-                let path = path.display();
-                Broken(match error.kind() {
-                    ErrorKind::NotFound => {
-                        format!("{path} is not there: is the adapter plugged in, or the simulator running?")
-                    }
-                    ErrorKind::PermissionDenied => format!(
-                        "{path} may not be opened: on Linux, join the group that owns it (often dialout)"
-                    ),
-                    _ => format!(
-                        "{path} cannot be opened at {line}: {error}; a pseudo-terminal takes no parity, use --format 8N1 or 8N2"
-                    ),
-                })
-            },
-        )?;
+        let port = Port::open(path, line, SerialPort::open).map_err(Broken)?;
         let name = format!("{} at {line}", path.display());
         Ok(Self::over(Carrier::Serial(port), name, line))
     }
@@ -68,26 +57,10 @@ impl Stream {
     ///
     /// When no server answers at the address.
     pub fn tcp(address: &str, line: LineFormat) -> Result<Self, Broken> {
-        let cannot = |why: String| Broken(format!("cannot connect to {address}: {why}"));
-        let found: Vec<_> = address
-            .to_socket_addrs()
-            .map_err(|error| cannot(format!("no address such as 127.0.0.1:5020: {error}")))?
-            .collect();
-        let mut last = "the name has no address".to_owned();
-        for one in found {
-            match TcpStream::connect_timeout(&one, Duration::from_secs(5)) {
-                Ok(socket) => {
-                    // Send a request immediately, not together with later bytes.
-                    socket
-                        .set_nodelay(true)
-                        .map_err(|error| cannot(error.to_string()))?;
-                    let name = format!("{address} (a line at {line})");
-                    return Ok(Self::over(Carrier::Tcp(socket), name, line));
-                }
-                Err(error) => last = error.to_string(),
-            }
-        }
-        Err(cannot(last))
+        let socket = connect(address)
+            .map_err(|why| Broken(format!("cannot connect to {address}: {why}")))?;
+        let name = format!("{address} (a line at {line})");
+        Ok(Self::over(Carrier::Tcp(socket), name, line))
     }
 
     fn over(carrier: Carrier, name: String, line: LineFormat) -> Self {
@@ -101,7 +74,7 @@ impl Stream {
 
     fn write(&mut self, bytes: &[u8]) -> Result<(), Broken> {
         let written = match &mut self.carrier {
-            Carrier::Serial(port) => port.write_all(bytes),
+            Carrier::Serial(port) => port.inner.write_all(bytes),
             Carrier::Tcp(socket) => socket.write_all(bytes),
         };
         written.map_err(|error| Broken(format!("{}: cannot send: {error}", self.name)))
@@ -125,9 +98,9 @@ impl Stream {
         let wait = wait.max(Duration::from_millis(1));
         let mut buffer = [0; 512];
         let read = match &mut self.carrier {
-            Carrier::Serial(port) => port
+            Carrier::Serial(Port { inner, .. }) => inner
                 .set_read_timeout(wait)
-                .and_then(|()| port.read(&mut buffer)),
+                .and_then(|()| inner.read(&mut buffer)),
             Carrier::Tcp(socket) => socket
                 .set_read_timeout(Some(wait))
                 .and_then(|()| socket.read(&mut buffer)),
@@ -148,24 +121,19 @@ impl Stream {
     }
 }
 
-fn configured(mut settings: Settings, line: LineFormat) -> std::io::Result<Settings> {
-    settings.set_raw();
-    settings.set_baud_rate(line.baud)?;
-    settings.set_char_size(match line.data_bits {
-        7 => CharSize::Bits7,
-        _ => CharSize::Bits8,
-    });
-    settings.set_parity(match line.parity {
-        Parity::None => SerialParity::None,
-        Parity::Even => SerialParity::Even,
-        Parity::Odd => SerialParity::Odd,
-    });
-    settings.set_stop_bits(match line.stop_bits {
-        1 => StopBits::One,
-        _ => StopBits::Two,
-    });
-    settings.set_flow_control(FlowControl::None);
-    Ok(settings)
+/// Connects to the first address of the host that answers. A request is sent immediately, not together with later bytes.
+pub(super) fn connect(address: &str) -> Result<TcpStream, String> {
+    let found = address.to_socket_addrs();
+    let found = found.map_err(|error| format!("no address such as 127.0.0.1:5020: {error}"))?;
+    let mut last = "the name has no address".to_owned();
+    for address in found {
+        let connected = TcpStream::connect_timeout(&address, CONNECTING);
+        match connected.and_then(|socket| socket.set_nodelay(true).map(|()| socket)) {
+            Ok(socket) => return Ok(socket),
+            Err(error) => last = error.to_string(),
+        }
+    }
+    Err(last)
 }
 
 impl Endpoint for Stream {
@@ -192,11 +160,12 @@ impl Endpoint for Stream {
         let Carrier::Serial(port) = &mut self.carrier else {
             return Err(Broken("a socket has no rate and format".to_owned()));
         };
-        let set = port
-            .get_configuration()
-            .and_then(|settings| configured(settings, line))
-            .and_then(|settings| port.set_configuration(&settings));
-        set.map_err(|error| Broken(format!("{} does not take {line}: {error}", self.name)))?;
+        let mut set = || {
+            let mut settings = port.inner.get_configuration()?;
+            line.apply_to_settings(&mut settings)?;
+            port.inner.set_configuration(&settings)
+        };
+        set().map_err(|error| Broken(format!("{} does not take {line}: {error}", self.name)))?;
         self.line = line;
         Ok(())
     }

@@ -4,11 +4,11 @@ use std::io::Write;
 use std::time::Duration;
 
 use delegate::delegate;
+use modbus_line::LineFormat;
 
 use super::{Abilities, Broken, Endpoint, Piece, Received};
 use crate::bench::shown;
 use crate::frame::hex;
-use crate::line::LineFormat;
 
 /// Another endpoint, with a log of what is sent and received on it.
 pub struct Trace<W> {

@@ -2,9 +2,10 @@
 
 use std::time::Duration;
 
+use modbus_line::LineFormat;
+
 use conformance::endpoint::{Abilities, Broken, Endpoint, Piece, Received};
 use conformance::frame::Mode;
-use conformance::line::LineFormat;
 
 use super::fault::Fault;
 use super::modio_fault::ModioFault;

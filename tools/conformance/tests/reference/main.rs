@@ -14,13 +14,13 @@ use conformance::case::{Case, Kind, Need};
 use conformance::cases::all;
 use conformance::cli::waits;
 use conformance::frame::Mode;
-use conformance::line::LineFormat;
 use conformance::probe::{Given, probe};
 use conformance::profile::Profile;
 use conformance::run::{Options, Outcome, Verdict, run};
 
 use endpoint::Reference;
 use fault::{FAULTS, Fault};
+use modbus_line::LineFormat;
 use modio_fault::{MODIO_FAULTS, ModioFault};
 
 const PROFILE: &str = r#"

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use conformance::line::LineFormat;
+use modbus_line::LineFormat;
 use modbus_reference::Device;
 use modio_description::{Description, checksum, describe};
 use register_map::board::MODIO_02;

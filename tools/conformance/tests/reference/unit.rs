@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use conformance::endpoint::Received;
 use conformance::frame::Mode;
-use conformance::line::LineFormat;
 
+use modbus_line::LineFormat;
 use modbus_reference::server::{BUS, ERRORS};
 use modbus_reference::{Server as Reference, crc, framed, lrc};
 

@@ -9,7 +9,7 @@ use conformance::case::Case;
 use conformance::cases::all;
 use conformance::endpoint::sim::Fitting;
 use conformance::frame::Mode;
-use conformance::line::LineFormat;
+use modbus_line::LineFormat;
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 use register_map::Module;
 use register_map::codes::{self, Baud, Format};

@@ -8,9 +8,9 @@ use std::time::Duration;
 
 use clap::{Args, CommandFactory, FromArgMatches, Parser};
 use etcetera::BaseStrategy;
+use modbus_line::{Format, LineFormat, t35};
 
 use super::adu::Framing;
-use super::format::Format;
 use crate::failure::Failure;
 
 /// Possible rates of a line in bit/s.
@@ -57,6 +57,12 @@ pub struct Endpoint {
 }
 
 impl Endpoint {
+    /// Returns rate and format of the line.
+    #[must_use]
+    pub const fn line(&self) -> LineFormat {
+        LineFormat::new(self.baud, self.format)
+    }
+
     /// Returns the duration of `bytes` bytes on the line, also for a gateway in transparent mode. Returns zero for
     /// Modbus TCP, whose server handles the timing of its line itself.
     #[must_use]
@@ -64,19 +70,15 @@ impl Endpoint {
         if self.framing == Framing::Mbap {
             return Duration::ZERO;
         }
-        let bits = f64::from(self.format.bits()) * bytes as f64;
-        Duration::from_secs_f64(bits / f64::from(self.baud))
+        self.line().characters(bytes)
     }
 
-    /// Returns the silence between frames on a serial line: t3.5, and 1.75 ms above 19200 bit/s (V1.02, 2.5.1.1).
+    /// Returns the silence between frames on a serial line: t3.5, in characters of the line's format.
     #[must_use]
     pub fn frame_gap(&self) -> Duration {
-        if self.framing == Framing::Mbap {
-            Duration::ZERO
-        } else if self.baud > 19_200 {
-            Duration::from_micros(1750)
-        } else {
-            self.time_of(7) / 2
+        match self.framing {
+            Framing::Mbap => Duration::ZERO,
+            Framing::Rtu | Framing::Ascii => t35(self.baud, self.format.bits()),
         }
     }
 }

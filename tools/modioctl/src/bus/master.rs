@@ -382,7 +382,7 @@ const fn differs(pdu: &[u8]) -> bool {
 mod tests {
     use super::*;
     use crate::bus::Place;
-    use crate::bus::format::Format;
+    use modbus_line::Format;
 
     /// As a simulator that is stopped: its pseudo-terminal is full at some time.
     #[tokio::test]

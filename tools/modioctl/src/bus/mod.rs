@@ -1,16 +1,15 @@
 //! A Modbus master: frames, the line, and the answers of units.
 
 pub mod endpoint;
-pub mod format;
 mod master;
 mod stream;
 mod sweep;
 
-pub use modbus_frames::{Direction, Waiting, adu, decode};
+pub use modbus_line::{Direction, Waiting, adu, decode};
 
 pub use endpoint::{Endpoint, Options, Place};
 pub use master::{Lost, MOST, Master, Observer, Seen};
-pub(crate) use stream::{Stream, is_pseudo_terminal};
+pub(crate) use stream::Stream;
 pub use sweep::{Found, LONG, REPORT, SHORT};
 
 /// Returns whether an exception is the answer of a gateway for a unit that does not answer it (V1.1b3 chapter 7, codes

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use modbus_frames::names;
+use modbus_line::names;
 use register_map::configuration::{BAUD, FRAME_GAP};
 use register_map::{fault, radio, state};
 use serde_json::{Map, Value as Json, json};

@@ -3,11 +3,11 @@
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
+use modbus_line::Format;
 use serde_json::json;
 
 use super::info::{Unidentified, identity};
 use crate::bus::adu::Framing;
-use crate::bus::format::Format;
 use crate::bus::{Endpoint, Found, LONG, Lost, Master, Observer, Place, REPORT, SHORT};
 use crate::cli::Scan;
 use crate::device::{Device, known, place};

@@ -5,12 +5,13 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use chrono::{DateTime, Local, SecondsFormat};
-use modbus_frames::capture::{Packet, Recorder};
+use modbus_line::capture::{Packet, Recorder};
+use modbus_line::port::is_pseudo_terminal;
 use serde_json::{Value as Json, json};
 use tokio::time::{Instant, timeout};
 
 use crate::bus::adu::{self, Framing};
-use crate::bus::{Direction, Endpoint, Place, Stream, decode, is_pseudo_terminal};
+use crate::bus::{Direction, Endpoint, Place, Stream, decode};
 use crate::cli::Sniff;
 use crate::device::place;
 use crate::failure::Failure;
@@ -83,7 +84,7 @@ pub async fn run(endpoint: &Endpoint, options: &Sniff, json: bool) -> Result<(),
 /// or a pseudo-terminal delivers all bytes of a frame at the same time.
 fn character(endpoint: &Endpoint) -> Duration {
     match &endpoint.place {
-        Place::Serial(path) if !is_pseudo_terminal(path) => endpoint.time_of(1),
+        Place::Serial(path) if !is_pseudo_terminal(path.as_ref()) => endpoint.time_of(1),
         _ => Duration::ZERO,
     }
 }

@@ -4,7 +4,7 @@ mod learn;
 mod orders;
 mod several;
 
-use modbus_frames::names;
+use modbus_line::names;
 
 pub use learn::{Learned, fetch, known};
 pub use orders::with_modules;

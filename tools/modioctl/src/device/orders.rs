@@ -240,7 +240,7 @@ mod tests {
         let serial = Endpoint {
             place: Place::Serial("COM3".to_owned()),
             baud: 9600,
-            format: crate::bus::format::Format::default(),
+            format: modbus_line::Format::default(),
             framing: Framing::Rtu,
             unit: 1,
             timeout: Duration::from_secs(1),

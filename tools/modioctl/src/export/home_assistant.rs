@@ -233,7 +233,7 @@ fn connection(endpoint: &Endpoint) -> Result<Connection, Failure> {
             baudrate: endpoint.baud,
             bytesize: endpoint.format.data_bits,
             method: endpoint.framing,
-            parity: endpoint.format.parity,
+            parity: endpoint.format.parity.letter(),
             stopbits: endpoint.format.stop_bits,
         }),
         Place::Tcp(address) => network("rtuovertcp", address),

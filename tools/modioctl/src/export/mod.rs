@@ -13,12 +13,26 @@ use modio_description::{Table, Unit, Value};
 
 use crate::bus::adu::Framing;
 use crate::bus::{Endpoint, Place};
-use crate::cli::ExportFormat;
 use crate::failure::Failure;
 use crate::names::{Book, Item, Meaning};
 
 /// Name of a line with several units, if the user gives none.
 const LINE: &str = "modio";
+
+/// A system for which a configuration can be written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum ExportFormat {
+    /// A table of all points and registers
+    Csv,
+    /// The description of the unit, with the endpoint
+    Json,
+    /// YAML for the integrations modbus and template
+    HomeAssistant,
+    /// TOML for the input plugin modbus
+    Telegraf,
+    /// A flow with nodes of node-red-contrib-modbus
+    NodeRed,
+}
 
 /// The units of a line.
 #[derive(Clone, Copy)]

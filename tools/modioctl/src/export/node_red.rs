@@ -4,6 +4,7 @@
 //! one request. A function node creates an object of names and values from each response. Each output has a function
 //! node that checks the value in `msg.payload`, and a write node.
 
+use modbus_line::Parity;
 use modio_description::Table;
 use serde_json::{Value as Json, json};
 
@@ -101,9 +102,9 @@ fn client(line: Line<'_>, id: &str, name: &str) -> Result<Json, Failure> {
         "serialDatabits": endpoint.format.data_bits.to_string(),
         "serialStopbits": endpoint.format.stop_bits.to_string(),
         "serialParity": match endpoint.format.parity {
-            'E' => "even",
-            'O' => "odd",
-            _ => "none",
+            Parity::None => "none",
+            Parity::Even => "even",
+            Parity::Odd => "odd",
         },
         "serialConnectionDelay": "100",
         "unit_id": line.units.first().map_or(endpoint.unit, |source| source.unit),

@@ -122,7 +122,7 @@ fn modbus(
         controller,
         baud_rate: serial.then_some(endpoint.baud),
         data_bits: serial.then_some(endpoint.format.data_bits),
-        parity: serial.then_some(endpoint.format.parity),
+        parity: serial.then_some(endpoint.format.parity.letter()),
         stop_bits: serial.then_some(endpoint.format.stop_bits),
         transmission_mode,
         configuration_type: "metric",

@@ -28,7 +28,7 @@ fn order(age: Duration) -> (String, Vec<u8>) {
         let endpoint = Endpoint {
             place: Place::Tcp(listener.local_addr().unwrap().to_string()),
             baud: 115_200,
-            format: crate::bus::format::Format::default(),
+            format: modbus_line::Format::default(),
             framing: Framing::Rtu,
             unit: 1,
             timeout: Duration::from_millis(20),

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use modbus_frames::names;
+use modbus_line::names;
 
 use super::Request;
 use crate::bus::adu::{Framing, request_length, response_length};

@@ -136,7 +136,7 @@ impl Splitter {
         let [unit, function, ..] = self.bytes[..] else {
             return None;
         };
-        let known = modbus_frames::names::function(function).is_some() && function & 0x7F != 0x2B;
+        let known = modbus_line::names::function(function).is_some() && function & 0x7F != 0x2B;
         let valid = !known && unit <= 247 && function & 0x7F != 0;
         if self.garbled.is_some() || !valid {
             return None;

@@ -2,7 +2,7 @@
 
 use std::sync::mpsc::Sender;
 
-use sim_options::Options;
+use sim::options::Options;
 
 use super::Event;
 use super::bench::Bench;

@@ -5,9 +5,9 @@ use std::path::Path;
 
 use register_map::{codes::Lora, configuration};
 use sim::board::Layout;
+use sim::options::{Fitting, Options};
 use sim::radio::Parameters;
 use sim::{Board, Config, Image};
-use sim_options::{Fitting, Options};
 
 use super::flash_file::FlashFile;
 use super::inside;

@@ -5,8 +5,8 @@ use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use modbus_frames::adu::Framing;
-use modbus_frames::capture::{Packet, Recorder};
+use modbus_line::adu::Framing;
+use modbus_line::capture::{Packet, Recorder};
 use sim::line::{Frame, Line};
 
 use super::frames;

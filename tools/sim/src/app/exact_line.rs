@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Sender};
 use std::thread;
 
-use ::exact_line::{LONGEST_LINE, Reply, Request};
+use modbus_line::exact::{LONGEST_LINE, Reply, Request};
 use sim::Time;
 use sim::exact_line::{Session, begin};
 

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use modbus_frames::{adu::Framing, decode};
+use modbus_line::{adu::Framing, decode};
 use serde::Serialize;
 use sim::Time;
 use sim::line::{Direction, Frame, Line};
@@ -84,10 +84,10 @@ pub fn summary(frame: &Frame) -> String {
 }
 
 /// The direction of a frame, in the terms of the standard.
-pub fn way(direction: Direction) -> modbus_frames::Direction {
+pub fn way(direction: Direction) -> modbus_line::Direction {
     match direction {
-        Direction::FromMaster => modbus_frames::Direction::Request,
-        Direction::FromUnit => modbus_frames::Direction::Response,
+        Direction::FromMaster => modbus_line::Direction::Request,
+        Direction::FromUnit => modbus_line::Direction::Response,
     }
 }
 

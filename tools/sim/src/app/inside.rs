@@ -31,7 +31,7 @@ fn elf(board: &Board) -> Option<Vec<u8>> {
 
 /// The version of the program, and on a line for each image inside it the version of that firmware.
 pub fn version() -> String {
-    let mut text = format!("modio-sim {}\n", commit::version!());
+    let mut text = format!("modio-sim {}\n", register_map::version!());
     for layout in Layout::ALL {
         if let Some(elf) = elf(layout.board) {
             let version = firmware(layout, &elf).unwrap_or_else(|| "of unknown version".to_owned());
@@ -61,7 +61,10 @@ mod tests {
     #[test]
     fn every_image_inside_is_for_a_board_and_reports_its_version() {
         let mut lines = version().lines().map(str::to_owned).collect::<Vec<_>>();
-        assert_eq!(lines.remove(0), format!("modio-sim {}", commit::version!()));
+        assert_eq!(
+            lines.remove(0),
+            format!("modio-sim {}", register_map::version!())
+        );
         assert_eq!(lines.len(), IMAGES.len(), "{lines:?}");
         for line in lines {
             assert!(!line.contains("unknown"), "{line}");

@@ -16,11 +16,11 @@
 
 use std::sync::{Weak, mpsc};
 
-use ::exact_line::Request;
-use modbus_frames::adu::Framing;
+use modbus_line::adu::Framing;
+use modbus_line::exact::Request;
 use sim::Time;
 use sim::line::{Format, Settings};
-use sim_options::Options;
+use sim::options::Options;
 
 mod action;
 mod api;

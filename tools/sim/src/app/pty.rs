@@ -14,6 +14,7 @@ use std::sync::mpsc::Sender;
 use std::thread;
 use std::time::Duration;
 
+use modbus_line::RATES;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{Mode, OFlags};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
@@ -94,7 +95,7 @@ impl Pty {
         let before = self.rate?;
         // Ignore rates that no UART has. A rate of 0 means that the master hangs up.
         let now = tcgetattr(&self.master).ok()?.output_speed();
-        let changed = now != before && (300..=4_000_000).contains(&now);
+        let changed = now != before && RATES.contains(&now.into());
         self.rate = Some(if changed { now } else { before });
         changed.then_some(now)
     }

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use modbus_frames::decode;
+use modbus_line::decode;
 use sim::Board;
 
 use super::flash_file::FlashFile;

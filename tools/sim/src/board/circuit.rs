@@ -1,12 +1,12 @@
 //! The circuit of a modio board: everything that is connected to the pins of the part.
 
 use crate::line::Line;
-use crate::periph::gpio::{Drive, Gpio};
-use crate::periph::i2c::{Bus, Wires};
-use crate::periph::usart::Wire;
 use crate::slot::Slot;
-use crate::soc::{Circuit, Pin, Pins};
-use crate::time::Time;
+use f103::periph::gpio::{Drive, Gpio};
+use f103::periph::i2c::{Bus, Wires};
+use f103::periph::usart::Wire;
+use f103::soc::{Circuit, Pin, Pins};
+use f103::time::Time;
 
 use super::{Config, Layout, Radio};
 
@@ -112,6 +112,8 @@ impl Circuit for Modio {
     fn set_power(&mut self, on: bool, now: Time) {
         if on {
             self.dip_at_power_on = self.dip;
+        } else {
+            self.line.power_off(now);
         }
         for slot in &mut self.slots {
             slot.set_power(on, now);

@@ -3,11 +3,11 @@
 use register_map::Module;
 
 use super::{Layout, MODIO_02};
-use crate::chip;
-use crate::corner::Corner;
 use crate::error::Error;
 use crate::radio::Parameters;
 use crate::slot;
+use f103::chip;
+use f103::corner::Corner;
 
 /// Configuration of a board before its first power-on.
 #[derive(Clone, Debug)]

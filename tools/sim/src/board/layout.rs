@@ -2,9 +2,9 @@
 
 use register_map::{Board, board};
 
-use crate::part::{Part, STM32F103CB, STM32F103RC};
 use crate::slot::mcp4728;
-use crate::soc::Pin;
+use f103::part::{Part, STM32F103CB, STM32F103RC};
+use f103::soc::Pin;
 
 use super::RadioPins;
 
@@ -128,7 +128,7 @@ const fn pins<const N: usize>(names: [(char, usize); N]) -> [Pin; N] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::machine::memory::FLASH_BASE;
+    use f103::machine::memory::FLASH_BASE;
 
     #[test]
     fn every_board_of_the_register_map_has_a_layout_that_matches() {

@@ -15,19 +15,35 @@ pub use layout::{Layout, MODIO_02, MODIO_08, SlotPins};
 pub use outside::Leds;
 pub use radio::{Radio, RadioPins};
 
-use crate::chip::Chip;
-use crate::error::Error;
-use crate::image::Image;
+use core::ops::{Deref, DerefMut};
 
-/// A virtual modio board.
-pub type Board = Chip<Modio>;
+use crate::error::Error;
+use f103::{Chip, Image, Time};
+
+/// A virtual modio board: a chip in the circuit of a modio board.
+#[derive(Debug)]
+pub struct Board(Chip<Modio>);
+
+impl Deref for Board {
+    type Target = Chip<Modio>;
+
+    fn deref(&self) -> &Chip<Modio> {
+        &self.0
+    }
+}
+
+impl DerefMut for Board {
+    fn deref_mut(&mut self) -> &mut Chip<Modio> {
+        &mut self.0
+    }
+}
 
 impl Board {
     /// A board with `image` in its flash, powered on at time 0.
     ///
     /// # Errors
     ///
-    /// [`Error::Image`] if the image does not fit into the flash or `config.flash` has another size, [`Error::Slot`] if
+    /// [`f103::Error::Image`] if the image does not fit into the flash or `config.flash` has another size, [`Error::Slot`] if
     /// `config.slots` names a slot that the board does not have.
     pub fn new(image: &Image, config: Config) -> Result<Self, Error> {
         let ports = config.layout.slots.iter().map(|slot| slot.port);
@@ -36,6 +52,16 @@ impl Board {
             return Err(Error::Slot(port));
         }
         let circuit = Modio::new(&config);
-        Self::in_circuit(image, config.chip(), circuit)
+        Ok(Self(Chip::in_circuit(image, config.chip(), circuit)?))
+    }
+
+    /// As [`Chip::run_until`]. A method of the board itself, so that the argument may borrow what contains the board.
+    pub fn run_until(&mut self, t: Time) {
+        self.0.run_until(t);
+    }
+
+    /// As [`Chip::run_for`]. A method of the board itself, as [`run_until`](Self::run_until).
+    pub fn run_for(&mut self, d: Time) {
+        self.0.run_for(d);
     }
 }

@@ -52,7 +52,7 @@ impl Board {
     ///
     /// # Errors
     ///
-    /// [`Error::Powered`] while the power is on.
+    /// [`f103::Error::Powered`] while the power is on.
     pub fn set_module(&mut self, module: Module) -> Result<(), Error> {
         self.set_module_at(self.layout().slots[0].port, module)
     }
@@ -61,10 +61,10 @@ impl Board {
     ///
     /// # Errors
     ///
-    /// [`Error::Powered`] while the power is on, [`Error::Slot`] if the board has no such slot.
+    /// [`f103::Error::Powered`] while the power is on, [`Error::Slot`] if the board has no such slot.
     pub fn set_module_at(&mut self, port: u8, module: Module) -> Result<(), Error> {
         if self.powered() {
-            return Err(Error::Powered);
+            return Err(f103::Error::Powered.into());
         }
         self.change_slot(port, |slot| slot.set_module(module))
     }
@@ -170,13 +170,13 @@ impl Board {
     /// Number of writes to USART1's data register since the last reset: one for each byte that the firmware sends.
     #[must_use]
     pub fn line_bytes_written(&self) -> u64 {
-        self.machine.bus.soc.usart1().data_writes()
+        self.usart1().data_writes()
     }
 
     /// The RS-485 line, for sending and for reading the record.
     pub fn line(&mut self) -> &mut Line {
         self.sync();
-        &mut self.machine.bus.soc.circuit.line
+        &mut self.circuit_mut().line
     }
 
     /// The LoRa module; `None` if the board has none.
@@ -205,7 +205,7 @@ impl Board {
     pub fn air(&mut self) -> Option<&mut Air> {
         self.sync();
         let now = self.now();
-        let radio = self.machine.bus.soc.circuit.radio.as_mut();
+        let radio = self.circuit_mut().radio.as_mut();
         let air = radio.and_then(|radio| radio.air.as_mut())?;
         air.set_earliest(now);
         Some(air)

@@ -3,12 +3,12 @@
 //! The module of a single board has the air with the gateway beside it, and both are computed together. On a bus with
 //! several boards the air belongs to the [bus](crate::bus), which passes the packets on.
 
-use crate::corner::Corner;
-use crate::periph::gpio::{Drive, Gpio};
-use crate::periph::usart::{Sent, TxPin, Wire};
 use crate::radio::{Air, Module, Parameters, Sender, tell};
-use crate::soc::{Pin, Pins};
-use crate::time::Time;
+use f103::corner::Corner;
+use f103::periph::gpio::{Drive, Gpio};
+use f103::periph::usart::{Sent, TxPin, Wire};
+use f103::soc::{Pin, Pins};
+use f103::time::Time;
 
 /// Pins of the LoRa module, besides those of USART3.
 #[derive(Clone, Copy, Debug)]

@@ -4,7 +4,7 @@ use super::Bus;
 use super::plan::Plan;
 use crate::board::Board;
 use crate::radio::{Air, Mode, News, tell, timing};
-use crate::time::Time;
+use f103::time::Time;
 
 impl Air {
     /// The air of these boards, from `now` on; `None` if no board has a module. The modules of the boards leave the air
@@ -12,7 +12,7 @@ impl Air {
     pub(super) fn of_boards(boards: &mut [Board], now: Time) -> Option<Self> {
         let mut air: Option<Self> = None;
         for (n, board) in (0..).zip(boards) {
-            let Some(radio) = &mut board.machine.bus.soc.circuit.radio else {
+            let Some(radio) = &mut board.circuit_mut().radio else {
                 continue;
             };
             let corner = radio.module.corner;
@@ -52,10 +52,8 @@ impl Bus {
 
     /// Passes the news of the module of board `n` on to the gateway and to the modules of the other boards.
     pub(super) fn pass_on_news(&mut self, n: usize) {
-        let (Some(air), Some(radio)) = (
-            &mut self.air,
-            &mut self.boards[n].machine.bus.soc.circuit.radio,
-        ) else {
+        let (Some(air), Some(radio)) = (&mut self.air, &mut self.boards[n].circuit_mut().radio)
+        else {
             return;
         };
         if !radio.module.has_news() {
@@ -97,12 +95,11 @@ impl Bus {
 impl Board {
     /// Passes news on to the board's module. Returns whether it has one.
     fn tell(&mut self, news: &News, loss: f64) -> bool {
-        let soc = &mut self.machine.bus.soc;
-        let Some(radio) = &mut soc.circuit.radio else {
+        let Some(radio) = &mut self.circuit_mut().radio else {
             return false;
         };
         tell(&mut radio.module, news, loss);
-        soc.wires_changed();
+        self.wires_changed();
         true
     }
 }

@@ -32,11 +32,10 @@ mod plan;
 use rayon::prelude::*;
 
 use crate::board::Board;
-use crate::chip::CYCLE;
 use crate::line::{Line, Output, Settings};
-use crate::machine::Limit;
 use crate::radio::Air;
-use crate::time::Time;
+use f103::chip::CYCLE;
+use f103::time::Time;
 pub use plan::{FARTHEST, LATEST};
 use plan::{Horizon, Plan};
 
@@ -71,7 +70,7 @@ impl Bus {
     /// If `boards` is empty.
     #[must_use]
     pub fn new(mut boards: Vec<Board>) -> Self {
-        let now = boards.iter().map(Board::now).min();
+        let now = boards.iter().map(|board| board.now()).min();
         let now = now.expect("a bus has at least one board");
         let mut air = None;
         if boards.len() > 1 {
@@ -128,7 +127,7 @@ impl Bus {
     /// The virtual time of the board that is farthest ahead.
     #[must_use]
     pub fn now(&self) -> Time {
-        let now = self.boards.iter().map(Board::now).max();
+        let now = self.boards.iter().map(|board| board.now()).max();
         now.unwrap_or(Time::ZERO)
     }
 
@@ -218,7 +217,7 @@ impl Bus {
             .filter_map(|(n, (board, plan))| Some((n, to(n, plan)?, board, plan)))
             .collect();
         due.par_iter_mut().for_each(|(_, to, board, plan)| {
-            board.run_on_bus(*to);
+            board.run_ahead(*to);
             **plan = board.plan();
         });
         let ran: Vec<_> = due.into_iter().map(|(n, ..)| n).collect();
@@ -265,16 +264,14 @@ impl Bus {
 impl Board {
     /// Calls `action` with the board's end of the line.
     fn end_of_line<T>(&mut self, action: impl FnOnce(&mut Line) -> T) -> T {
-        let soc = &mut self.machine.bus.soc;
-        let answer = action(&mut soc.circuit.line);
-        soc.wires_changed();
+        let answer = action(&mut self.circuit_mut().line);
+        self.wires_changed();
         answer
     }
 
     /// Returns the unit's output to the bus; `None` if it is as in the last call.
     fn take_output(&mut self) -> Option<Output> {
-        let soc = &mut self.machine.bus.soc;
-        if !(soc.usart1().has_sent() || soc.circuit.line.has_changed()) {
+        if !(self.usart1().has_sent() || self.circuit().line.has_changed()) {
             return None;
         }
         self.sync();
@@ -283,27 +280,13 @@ impl Board {
 
     /// Takes over the changes that were made to the circuit since the last run.
     fn apply_changes(&mut self) {
-        let now = self.now();
-        self.machine.bus.soc.refresh(now);
+        self.refresh();
         self.sync();
-    }
-
-    /// Runs until `t`, or to the end of the instruction that is being executed then. Does not compute the parts that
-    /// are computed on demand.
-    fn run_on_bus(&mut self, t: Time) {
-        if self.now() < t {
-            self.machine.run(Limit {
-                time: t,
-                instructions: u64::MAX,
-                pc: None,
-                breakpoints: false,
-            });
-        }
     }
 
     /// The rate and format of the unit, for a master that follows it; `None` while the power is off.
     fn line_settings(&self) -> Option<Settings> {
-        let usart = self.machine.bus.soc.usart1();
+        let usart = self.usart1();
         self.powered().then(|| usart.settings()).flatten()
     }
 }

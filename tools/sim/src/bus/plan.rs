@@ -2,7 +2,7 @@
 
 use crate::board::Board;
 use crate::radio::timing;
-use crate::time::Time;
+use f103::time::Time;
 
 /// Most time by which other boards run ahead of a unit whose transmitter is off. Such a transmitter sends an idle frame
 /// before its first character, and the idle frame takes longer at every rate of a line.
@@ -71,8 +71,8 @@ impl Horizon {
 impl Board {
     /// The next actions of the board.
     pub(super) fn plan(&self) -> Plan {
-        let awake = self.machine.next_instruction();
-        let usart = self.machine.bus.soc.usart1();
+        let awake = self.next_instruction();
+        let usart = self.usart1();
         let start = match usart.earliest_start(awake) {
             _ if awake == Time::MAX => awake,
             Some(start) => start,

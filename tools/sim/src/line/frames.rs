@@ -2,10 +2,10 @@
 
 use std::collections::VecDeque;
 
-use modbus_frames::adu::Framing;
+use modbus_line::adu::Framing;
 
-use crate::serial::Word;
-use crate::time::Time;
+use f103::serial::Word;
+use f103::time::Time;
 
 /// Number of the last frames that are kept, unless the record keeps all frames.
 pub const KEPT: usize = 1000;

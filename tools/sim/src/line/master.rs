@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 
 use super::{Character, Line, Span};
-use crate::serial::Wave;
-use crate::time::Time;
+use f103::serial::Wave;
+use f103::time::Time;
 
 /// A character that the master has received while a unit was sending.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

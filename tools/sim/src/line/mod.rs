@@ -26,15 +26,16 @@ mod tests;
 
 use std::collections::VecDeque;
 
-use crate::periph::usart::TxPin;
-pub use crate::serial::{Character, Format, Parity, Rate, Settings};
-use crate::serial::{Receiver, Wave};
-use crate::time::Time;
+use f103::periph::usart::TxPin;
+pub use f103::serial::{Character, Format, Parity, Rate, Settings};
+use f103::serial::{Receiver, Wave};
+use f103::time::Time;
 pub use frames::{Direction, Frame, KEPT, LONGEST, Record};
 use master::Master;
 pub use master::Received;
 pub(crate) use shared::Output;
 use shared::Shared;
+pub use silence::frame_silence;
 
 /// How far back [`Line::level_at`] knows the level of the bus.
 pub const HISTORY: Time = Time::from_ms(100);

@@ -13,9 +13,9 @@
 use std::collections::VecDeque;
 
 use super::{HISTORY, Line, Span, keep};
-use crate::periph::usart::TxPin;
-use crate::serial::{Settings, Wave};
-use crate::time::Time;
+use f103::periph::usart::TxPin;
+use f103::serial::{Settings, Wave};
+use f103::time::Time;
 
 /// Role of a [`Line`] on a bus with several units.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,9 +1,9 @@
 //! The connection of the bus to the board: the driver at the TX pin, and the receiver at the RX pin.
 
-use super::{Direction, HISTORY, Line, Received, Span, keep};
-use crate::periph::usart::{Sent, TxPin, Usart, Wire};
-use crate::serial::{Framing, Wave, Word};
-use crate::time::Time;
+use super::{Direction, HISTORY, Line, Received, Span, frame_silence, keep};
+use f103::periph::usart::{Sent, TxPin, Usart, Wire};
+use f103::serial::{Framing, Wave, Word};
+use f103::time::Time;
 
 impl Wire for Line {
     fn sent(&mut self, sent: Sent) {
@@ -96,6 +96,12 @@ impl Line {
         self.shared.switched(now, on);
         keep(&mut self.driver_edges, (now, on), self.keep_all);
         self.settle(now);
+    }
+
+    /// Switches the unit's driver off because it has no supply any more, which the firmware cannot prevent.
+    pub fn power_off(&mut self, now: Time) {
+        self.last_sent = None;
+        self.set_driver(false, now);
     }
 
     /// Chooses whether the unit receives its echo because its receiver stays on while its driver is on. Off at first,
@@ -224,7 +230,7 @@ impl Line {
     /// Records every character that was received up to now. Drops edges that are not needed any more.
     pub(super) fn listen(&mut self) {
         let framing = Framing::of(self.settings);
-        let silence = self.settings.frame_silence();
+        let silence = frame_silence(self.settings);
         while let Some(word) = self.listener.next_word(&self.bus, &framing, self.now) {
             let word = Word {
                 data: framing.payload(word.data),

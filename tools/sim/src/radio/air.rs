@@ -4,10 +4,10 @@ use std::collections::VecDeque;
 
 use super::parameters::SLEEP_UART;
 use super::{Byte, Module, News, Packet, Parameters, Sender, timing};
-use crate::corner::Corner;
-use crate::periph::usart::{Sent, TxPin};
-use crate::serial::Character;
-use crate::time::Time;
+use f103::corner::Corner;
+use f103::periph::usart::{Sent, TxPin};
+use f103::serial::Character;
+use f103::time::Time;
 
 /// Number of packets, and of received bytes, that are kept.
 const KEPT: usize = 65_536;

@@ -3,7 +3,7 @@
 use fastrand::Rng;
 
 use super::{Mode, Packet, Parameters, Sender, timing};
-use crate::time::Time;
+use f103::time::Time;
 
 /// Seed of the losses.
 const SEED: u64 = 0x6C6F_7261;

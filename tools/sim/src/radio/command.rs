@@ -1,7 +1,7 @@
 //! The commands that a module takes in sleep (manual 7).
 
 use super::{Parameters, timing};
-use crate::time::Time;
+use f103::time::Time;
 
 /// Head of a command that stores parameters, and of an answer with them.
 const STORED: u8 = 0xC0;

@@ -1,8 +1,8 @@
 //! A packet on the air.
 
 use super::{Parameters, timing};
-use crate::corner::Corner;
-use crate::time::Time;
+use f103::corner::Corner;
+use f103::time::Time;
 
 /// The transmitter of a packet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! The modes and the parameters of the module (manual 6 and 7.5).
 
-use crate::serial::{Format, Settings};
-use crate::time::Time;
+use f103::serial::{Format, Settings};
+use f103::time::Time;
 
 /// Mode of the module, by its pins M0 and M1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

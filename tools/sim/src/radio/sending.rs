@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use super::timing;
-use crate::time::Time;
+use f103::time::Time;
 
 /// Bytes on their way from the UART to the air.
 #[derive(Clone, Debug, Default)]

@@ -5,8 +5,8 @@
 //! gives a delay of 1.5 s for 100 bytes at 2.4 kbit/s, for which the model takes 0.7 s. So a packet takes twice as long
 //! at the slow corner, and these bytes 1.2 s.
 
-use crate::corner::Corner;
-use crate::time::Time;
+use f103::corner::Corner;
+use f103::time::Time;
 
 /// Self-check after power-on and after the command C4, in which AUX is low. Assumption: drivers in the field wait 40 ms
 /// to 1 s.

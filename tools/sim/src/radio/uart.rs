@@ -3,9 +3,9 @@
 use std::collections::VecDeque;
 
 use super::parameters::SLEEP_UART;
-use crate::periph::usart::{Sent, TxPin};
-use crate::serial::{Character, Framing, Receiver, Settings, Wave, Word};
-use crate::time::Time;
+use f103::periph::usart::{Sent, TxPin};
+use f103::serial::{Character, Framing, Receiver, Settings, Wave, Word};
+use f103::time::Time;
 
 /// A byte that a module has sent at TXD.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

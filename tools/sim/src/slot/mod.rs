@@ -1,15 +1,15 @@
 //! A slot: the module in it, and what is connected to the channels of the module.
 //!
-//! Four lines lead from the slot to the part's pins. Modules with analog outputs are also connected to I2C1.
+//! Four lines lead from the slot to the part's pins, one for each point of the module. Modules with analog outputs are
+//! also connected to I2C1. The kind of a point defines its line, so that a new module needs no code here:
 //!
-//! | module | lines |
+//! | point | line |
 //! |---|---|
-//! | 4DI | low while the input is energised, else floating |
-//! | 4DO | line high = the transistor conducts |
-//! | 2Relay | lines 1, 2: jumper of relay 1, 2, low = manual; lines 3, 4: coil, high = energised |
-//! | 4AI | the voltage at the pin |
-//! | 4AO | none: an MCP4728 on I2C |
-//! | 2AI2AO | lines 1, 2 as 4AI; outputs 3, 4 are DAC channels C, D |
+//! | bit input | low while the input is energised, else floating |
+//! | bit output | line high = the transistor conducts |
+//! | bits of a 2Relay | lines 1, 2: jumper of relay 1, 2, low = manual; lines 3, 4: coil, high = energised |
+//! | analog input | the voltage at the pin |
+//! | analog output | none: output A, B, C or D of an MCP4728 on I2C |
 
 mod channel;
 pub mod mcp4728;
@@ -20,10 +20,11 @@ mod tests;
 pub use channel::{Channel, Error, MAX_MILLIVOLTS};
 use mcp4728::{Mcp4728, Setting};
 use register_map::Module;
+use register_map::points::Kind;
 
-use crate::periph::gpio::Drive;
-use crate::periph::i2c::{Bus, Wires};
-use crate::time::Time;
+use f103::periph::gpio::Drive;
+use f103::periph::i2c::{Bus, Wires};
+use f103::time::Time;
 
 /// Default source impedance of an analog input, in ohms. It is more than that of the range with the highest impedance:
 /// the thermistor at 25 degrees Celsius with its pull-up has 5 kOhm.
@@ -133,29 +134,25 @@ impl Slot {
             return Channel::None;
         }
         let n = ch - 1;
-        match self.module {
-            Module::Di4 => Channel::Di {
-                energised: self.energised[n],
-            },
-            Module::Do4 => Channel::Do {
-                on: self.powered && self.driven[n],
-            },
-            Module::Relay2 if n < 2 => Channel::Relay {
+        match (self.module, self.module.points()[n]) {
+            // A relay has two points: its jumper and its coil.
+            (Module::Relay2, Kind::BitInput) => Channel::Relay {
                 energised: self.powered && self.driven[n + 2],
                 manual: self.manual[n],
             },
-            Module::Ai4 => self.analog_input(n),
-            Module::Ai2Ao2 if n < 2 => self.analog_input(n),
-            Module::Ao4 | Module::Ai2Ao2 => Channel::Ao {
+            (Module::Relay2, _) | (_, Kind::None) => Channel::None,
+            (_, Kind::BitInput) => Channel::Di {
+                energised: self.energised[n],
+            },
+            (_, Kind::BitOutput) => Channel::Do {
+                on: self.powered && self.driven[n],
+            },
+            (_, Kind::WordInput) => Channel::Ai {
+                millivolts: self.millivolts[n],
+            },
+            (_, Kind::WordOutput) => Channel::Ao {
                 code: if self.powered { self.dac.output(n) } else { 0 },
             },
-            Module::None | Module::Relay2 => Channel::None,
-        }
-    }
-
-    const fn analog_input(&self, n: usize) -> Channel {
-        Channel::Ai {
-            millivolts: self.millivolts[n],
         }
     }
 
@@ -223,13 +220,11 @@ impl Slot {
     #[must_use]
     pub fn drive(&self, line: usize) -> Drive {
         let pulls = |low| if low { Drive::Low } else { Drive::Floating };
-        match (self.module, line) {
-            (Module::Di4, 1..=4) => pulls(self.energised[line - 1]),
-            (Module::Relay2, 1 | 2) => pulls(self.manual[line - 1]),
-            (Module::Ai4, 1..=4) | (Module::Ai2Ao2, 1 | 2) => {
-                Drive::Millivolts(self.millivolts[line - 1])
-            }
-            _ => Drive::Floating,
+        match self.channel(line) {
+            Channel::Di { energised } => pulls(energised),
+            Channel::Relay { manual, .. } => pulls(manual),
+            Channel::Ai { millivolts } => Drive::Millivolts(millivolts),
+            Channel::None | Channel::Do { .. } | Channel::Ao { .. } => Drive::Floating,
         }
     }
 
@@ -243,8 +238,8 @@ impl Slot {
 
     /// Whether the module has a DAC on I2C1.
     #[must_use]
-    pub const fn has_dac(&self) -> bool {
-        matches!(self.module, Module::Ao4 | Module::Ai2Ao2)
+    pub fn has_dac(&self) -> bool {
+        self.module.points().contains(&Kind::WordOutput)
     }
 
     /// The four input registers of the DAC, and the four settings in its EEPROM, A to D.
@@ -294,7 +289,7 @@ impl Slot {
         }
     }
 
-    const fn answers(&self) -> bool {
+    fn answers(&self) -> bool {
         self.powered && self.has_dac() && !matches!(self.fault, BusFault::Absent)
     }
 }

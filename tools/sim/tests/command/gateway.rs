@@ -4,7 +4,7 @@ use std::io::{ErrorKind, Read, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-use modbus_frames::adu::Framing;
+use modbus_line::adu::Framing;
 
 use super::record::packets;
 use super::{IN_USE, Running, connect, endless_loop, refused, state};

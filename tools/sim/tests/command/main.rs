@@ -16,7 +16,7 @@ use std::net::{TcpListener, TcpStream};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use modbus_frames::adu::Framing;
+use modbus_line::adu::Framing;
 use running::*;
 
 #[test]
@@ -47,7 +47,7 @@ fn without_pseudo_terminals_the_error_names_the_missing_option() {
     let said = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(2), "{said}");
     assert_eq!(said.lines().count(), 1, "{said}");
-    assert_eq!(said.contains("--tcp"), !sim_options::PTY, "{said}");
+    assert_eq!(said.contains("--tcp"), !sim::options::PTY, "{said}");
 }
 
 #[cfg(unix)]
@@ -58,12 +58,12 @@ fn signals_end_the_simulator_with_success_and_remove_the_link() {
     for signal in ["-INT", "-TERM"] {
         let link = directory.path().join("line");
         let mut arguments = vec!["--elf", elf.to_str().unwrap(), "--http", "127.0.0.1:0"];
-        if sim_options::PTY {
+        if sim::options::PTY {
             arguments.extend(["--pty", link.to_str().unwrap()]);
         }
         let mut running = Running::start(&arguments);
         let pty = running.line();
-        if sim_options::PTY {
+        if sim::options::PTY {
             assert_eq!(fs::read_link(&link).unwrap(), std::path::Path::new(&pty));
         }
         running.endpoint("http: http://127.0.0.1:");
@@ -88,7 +88,7 @@ fn simulator_ends_after_the_given_time() {
 fn every_endpoint_is_announced_and_answers() {
     let fitting = ["--dip", "17", "--module", "2relay"];
     let mut running = Running::start_loop(&[&["--tcp", "127.0.0.1:0"][..], &fitting].concat());
-    if sim_options::PTY {
+    if sim::options::PTY {
         running.endpoint("pty: /");
     }
     let mut line = TcpStream::connect(running.endpoint("tcp: ")).unwrap();
@@ -160,7 +160,7 @@ fn a_port_or_a_link_in_use_is_refused() {
     let gdb = ["--elf", elf, "--http", "127.0.0.1:0", "--gdb", &address];
     refused(&gdb, &[&address, IN_USE]);
     let pty = ["--elf", elf, "--http", "127.0.0.1:0", "--pty", elf];
-    let part = if sim_options::PTY { elf } else { "--tcp" };
+    let part = if sim::options::PTY { elf } else { "--tcp" };
     refused(&pty, &[part]);
 }
 

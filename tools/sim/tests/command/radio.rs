@@ -7,12 +7,12 @@ use std::path::Path;
 use crate::running::*;
 
 #[allow(dead_code, reason = "the tests of the core use all of the assembler")]
-#[path = "../machine/asm.rs"]
+#[path = "../../../f103/tests/machine/asm.rs"]
 mod asm;
-#[path = "../machine/echo.rs"]
+#[path = "../board/echo.rs"]
 mod echo;
 #[allow(dead_code, reason = "the tests of the core use all of the registers")]
-#[path = "../machine/regs.rs"]
+#[path = "../../../f103/tests/machine/regs.rs"]
 mod regs;
 
 /// Writes an ELF file whose firmware sends each byte from the air back, plus one.
@@ -37,7 +37,7 @@ fn lora_excludes_the_exact_line_and_needs_a_link() {
 
 #[test]
 fn lora_is_refused_without_pseudo_terminals() {
-    if sim_options::PTY {
+    if sim::options::PTY {
         return;
     }
     let directory = tempfile::tempdir().unwrap();
@@ -47,7 +47,7 @@ fn lora_is_refused_without_pseudo_terminals() {
 
 #[test]
 fn file_at_the_path_of_the_link_is_not_replaced() {
-    if !sim_options::PTY {
+    if !sim::options::PTY {
         return;
     }
     let directory = tempfile::tempdir().unwrap();
@@ -58,7 +58,7 @@ fn file_at_the_path_of_the_link_is_not_replaced() {
 
 #[test]
 fn gateway_is_the_last_endpoint_and_its_link_is_removed_at_the_end() {
-    if !sim_options::PTY {
+    if !sim::options::PTY {
         return;
     }
     let directory = tempfile::tempdir().unwrap();
@@ -83,7 +83,7 @@ fn gateway_is_the_last_endpoint_and_its_link_is_removed_at_the_end() {
 
 #[test]
 fn bytes_at_the_gateway_reach_the_board_and_its_answer_comes_back() {
-    if !sim_options::PTY {
+    if !sim::options::PTY {
         return;
     }
     let directory = tempfile::tempdir().unwrap();

@@ -6,7 +6,7 @@ use std::net::TcpStream;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use modbus_frames::adu::Framing;
+use modbus_line::adu::Framing;
 use pcap_file::pcapng::{Block, PcapNgReader};
 
 use super::{ENDS, Running};

@@ -69,7 +69,7 @@ pub const LINES: [&str; 3] = ["--tcp", "--modbus-tcp", "--exact-line"];
 /// Returns the command with these arguments, and with `--tcp` where the simulator would not start without it.
 pub fn command(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_modio-sim"));
-    if !sim_options::PTY && !arguments.iter().any(|name| LINES.contains(name)) {
+    if !sim::options::PTY && !arguments.iter().any(|name| LINES.contains(name)) {
         command.args(["--tcp", "127.0.0.1:0"]);
     }
     command
@@ -119,12 +119,12 @@ impl Running {
     /// Returns the path of the pseudo-terminal. On systems without one, returns the address of the line over TCP, which
     /// [`command`] has added to the arguments.
     pub fn line(&mut self) -> String {
-        self.endpoint(if sim_options::PTY { "pty: " } else { "tcp: " })
+        self.endpoint(if sim::options::PTY { "pty: " } else { "tcp: " })
     }
 
     /// Reads the line that announces the pseudo-terminal, where there is one.
     pub fn skip_pty(&mut self) {
-        if sim_options::PTY {
+        if sim::options::PTY {
             self.endpoint("pty: ");
         }
     }

@@ -3,7 +3,7 @@
 use std::fs;
 use std::time::{Duration, Instant};
 
-use modbus_frames::adu::Framing;
+use modbus_line::adu::Framing;
 
 use super::unit::{BAUD, COMMAND, KEY, Unit};
 use super::{ENDS, Running, endless_loop, get, post, refused, state};

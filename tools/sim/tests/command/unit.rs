@@ -4,7 +4,7 @@ use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::time::Duration;
 
-use modbus_frames::adu::Framing;
+use modbus_line::adu::Framing;
 
 use super::{ENDS, Running, state};
 

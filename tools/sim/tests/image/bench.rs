@@ -6,7 +6,7 @@ use register_map::{configuration, points};
 use sim::{
     Board, Config, Corner, Finding, Image, Module, Time,
     finding::What,
-    line::{Format, Settings},
+    line::{Format, Settings, frame_silence},
 };
 
 use crate::{ELF, LAYOUT};
@@ -207,7 +207,7 @@ impl Bench {
 
     /// Returns t3.5 on the line.
     pub fn t35(&self) -> Time {
-        self.settings.frame_silence()
+        frame_silence(self.settings)
     }
 
     /// Sends these bytes now and gives the unit time to answer. Returns the bytes of the reply, if there is one.

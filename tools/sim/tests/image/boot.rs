@@ -24,7 +24,7 @@ fn log_reports_module_line_settings_reset_cause_and_unit_address() {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn unit_reports_the_commit_that_it_was_built_from() {
-    let commit = commit::commit!().get(..8).unwrap_or_default();
+    let commit = register_map::commit!().get(..8).unwrap_or_default();
     // Outside a repository the commit is not known.
     let commit = u32::from_str_radix(commit, 16).unwrap_or_default();
     let mut bench = Bench::new(Module::Do4, 1);

@@ -162,6 +162,7 @@ fn a_unit_that_loses_power_in_mid_reply_releases_the_line() {
     }
     bus.run_for(settings.rate().bits(28));
     bus.board_mut(0).power_off();
+    assert_eq!(bus.board(0).findings(), []);
     let cut = bus.now();
     bus.run_until(sent + Time::from_ms(50));
     let received = bus.line().take_received();

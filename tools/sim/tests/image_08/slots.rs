@@ -102,7 +102,7 @@ fn only_ports_1_to_4_accept_a_module() {
     for port in 1..=8 {
         let address = MODULE + port - 1;
         let expected = if port <= 4 { Ok(()) } else { Err(3) };
-        for module in 1..=6 {
+        for module in 1..=Module::LAST {
             assert_eq!(bench.write(address, &[module]), expected, "port {port}");
             assert_eq!(bench.write_single(6, address, module), expected);
         }

@@ -70,7 +70,7 @@ impl Reply {
 impl From<Error> for Reply {
     fn from(error: Error) -> Self {
         let status = match error {
-            Error::Powered | Error::Channel | Error::NoRadio => 409,
+            Error::Part(f103::Error::Powered) | Error::Channel | Error::NoRadio => 409,
             Error::Slot(_) => 404,
             _ => 400,
         };

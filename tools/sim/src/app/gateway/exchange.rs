@@ -1,8 +1,8 @@
 //! A request on the line, until its reply was received or the time for it is over.
 
-use modbus_frames::adu::{ASCII_MOST, Framing, RTU_MOST};
+use modbus_line::adu::{ASCII_MOST, Framing, RTU_MOST};
 use sim::Time;
-use sim::line::{Direction, Frame, Line, Settings};
+use sim::line::{Direction, Frame, Line, Settings, frame_silence};
 
 use super::mbap::Request;
 use crate::app::Origin;
@@ -96,7 +96,7 @@ pub fn patience(framing: Framing, settings: Settings) -> Time {
         Framing::Ascii => ASCII_MOST,
         Framing::Rtu | Framing::Mbap => RTU_MOST,
     };
-    BEGINS + settings.characters(longest as u64) + settings.frame_silence() + settings.characters(1)
+    BEGINS + settings.characters(longest as u64) + frame_silence(settings) + settings.characters(1)
 }
 
 #[cfg(test)]

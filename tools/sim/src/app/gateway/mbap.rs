@@ -2,7 +2,7 @@
 
 use std::io::{self, Read};
 
-use modbus_frames::adu::MBAP;
+use modbus_line::adu::MBAP;
 
 /// Largest length in a header: the unit identifier and the longest PDU, in bytes.
 const MOST: usize = 254;
@@ -48,7 +48,7 @@ pub fn read(stream: &mut impl Read) -> io::Result<Option<Request>> {
 
 #[cfg(test)]
 mod tests {
-    use modbus_frames::adu::Framing;
+    use modbus_line::adu::Framing;
 
     use super::*;
 

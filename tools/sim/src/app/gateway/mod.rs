@@ -19,7 +19,7 @@ use std::collections::VecDeque;
 use std::net::SocketAddr;
 use std::sync::mpsc::{Sender, TryRecvError};
 
-use modbus_frames::adu::Framing;
+use modbus_line::adu::Framing;
 
 use self::client::{Client, Responses};
 use self::exchange::{Exchange, Outcome};

@@ -1,6 +1,6 @@
 //! The mode of the line, RTU or ASCII, in which the gateway sends.
 
-use modbus_frames::adu::Framing;
+use modbus_line::adu::Framing;
 use register_map::{codes, configuration};
 use sim::Board;
 use sim::line::{Format, Settings};

@@ -4,12 +4,14 @@ use axum::Router;
 use axum::http::header;
 use axum::response::IntoResponse;
 use axum::routing::get;
+use register_map::Module;
+use serde_json::json;
 
 const HTML: &str = "text/html; charset=utf-8";
 const CSS: &str = "text/css; charset=utf-8";
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 
-/// Path, type and content of each file.
+/// Path, type and content of each file, except `/modules.js`.
 pub const FILES: [(&str, &str, &str); 14] = [
     ("/", HTML, include_str!("../page/index.html")),
     ("/page.css", CSS, include_str!("../page/page.css")),
@@ -32,15 +34,23 @@ const POLICY: &str = "default-src 'self'; img-src data:; frame-ancestors 'none'"
 
 /// The routes of the page.
 pub fn routes<S: Clone + Send + Sync + 'static>() -> Router<S> {
+    let modules = get(|| async { file(SCRIPT, modules()) });
+    let modules = Router::new().route("/modules.js", modules.fallback(super::not_get));
     FILES
         .into_iter()
-        .fold(Router::new(), |router, (path, kind, text)| {
+        .fold(modules, |router, (path, kind, text)| {
             let page = get(move || async move { file(kind, text) });
             router.route(path, page.fallback(super::not_get))
         })
 }
 
-fn file(kind: &'static str, text: &'static str) -> impl IntoResponse {
+/// Returns the script with the name and the description of every module.
+fn modules() -> String {
+    let modules = Module::ALL.map(|module| [module.name(), module.about()]);
+    format!("export const modules = {};\n", json!(modules))
+}
+
+fn file(kind: &'static str, text: impl IntoResponse) -> impl IntoResponse {
     let headers = [
         (header::CONTENT_TYPE, kind),
         (header::CONTENT_SECURITY_POLICY, POLICY),

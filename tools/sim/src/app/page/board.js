@@ -1,6 +1,7 @@
 // The board: power, switch, LEDs, line, and the slots with their modules.
 
-import { modules, pointName, slotsOf } from "/model.js";
+import { pointName, slotsOf, terminals } from "/model.js";
+import { modules } from "/modules.js";
 import { post } from "/api.js";
 import { buildChannel, showChannel } from "/channels.js";
 import { byId, element, select, setText } from "/ui.js";
@@ -102,7 +103,6 @@ function rocker(n) {
 
 function buildSlot(slot, n) {
   const title = `Port ${slot.port}`;
-  const module = modules[slot.module];
   const made = slot.channels.map((channel, at) => buildChannel(slot, idOf(n, at), channel, at + 1, redraw));
   return element("div", { class: `slot m-${slot.module}`, role: "group", "aria-label": title },
     element("header", {},
@@ -110,11 +110,11 @@ function buildSlot(slot, n) {
       select({
         id: `module-${n}`, "aria-label": `Module in ${title}`,
         onchange: (event) => post(`${slot.path}module`, { name: event.target.value }),
-      }, Object.entries(modules).map(([name, each]) => [name, each.text]))),
+      }, modules.map(([name, about]) => [name, `${name}: ${about}`]))),
     element("p", { class: "mismatch", id: `mismatch-${n}` }),
     element("div", { class: "channels" }, ...made.filter(Boolean)),
     element("ol", { class: "terminals", "aria-label": `Screw terminals of ${title}` },
-      ...module.terminals.map((label) => element("li", {}, element("span", {}, label)))));
+      ...terminals(slot.module).map((label) => element("li", {}, element("span", {}, label)))));
 }
 
 /** Shows the LoRa module. */

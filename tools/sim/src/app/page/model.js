@@ -51,17 +51,14 @@ export function share(channel) {
   return null;
 }
 
-const FOUR = ["1", "2", "3", "4", "COM"];
-/** The modules, each with its description and the labels of its five screw terminals. */
-export const modules = {
-  none: { text: "empty slot", terminals: ["", "", "", "", ""] },
-  "4di": { text: "4DI, digital inputs", terminals: FOUR },
-  "4do": { text: "4DO, digital outputs", terminals: FOUR },
-  "2relay": { text: "2Relay, relays", terminals: ["1 COM", "1 NO", "2 COM", "2 NO", "2 NC"] },
-  "4ai": { text: "4AI, analog inputs", terminals: FOUR },
-  "4ao": { text: "4AO, analog outputs", terminals: FOUR },
-  "2ai2ao": { text: "2AI2AO, analog inputs and outputs", terminals: FOUR },
+/** Labels of the five screw terminals of modules that do not have one terminal for each point. */
+const LABELS = {
+  none: ["", "", "", "", ""],
+  "2relay": ["1 COM", "1 NO", "2 COM", "2 NO", "2 NC"],
 };
+
+/** Returns the labels of a module's five screw terminals. */
+export const terminals = (module) => LABELS[module] ?? ["1", "2", "3", "4", "COM"];
 
 /** Port of the only slot of a modio-02. The state of a board with one slot does not name the port. */
 const ONLY_PORT = 5;

@@ -21,7 +21,7 @@ use std::time::Duration;
 use register_map::Module;
 use serde::{Deserialize, Deserializer};
 use sim::Time;
-use sim_options::toml_error;
+use sim::options::toml_error;
 
 use super::super::action::{Action, Change};
 use super::super::faults::Faults;

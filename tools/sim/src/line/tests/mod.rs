@@ -4,9 +4,9 @@ mod faults;
 mod several;
 
 use super::*;
-use crate::periph::timer::{Kind, Timer};
-use crate::periph::usart::{Usart, Wire};
-use crate::peripheral::Peripheral;
+use f103::periph::timer::{Kind, Timer};
+use f103::periph::usart::{Usart, Wire};
+use f103::peripheral::Peripheral;
 
 const HZ: u32 = 72_000_000;
 /// 115200 bit/s at 72 MHz.

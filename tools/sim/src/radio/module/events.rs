@@ -5,8 +5,8 @@ use crate::radio::command::Command;
 use crate::radio::packet::{News, Packet, Sender};
 use crate::radio::parameters::{Mode, SLEEP_UART};
 use crate::radio::timing;
-use crate::serial::Word;
-use crate::time::Time;
+use f103::serial::Word;
+use f103::time::Time;
 
 /// Most bytes that can be a command.
 const LONGEST_COMMAND: usize = 6;

@@ -9,9 +9,9 @@ use super::parameters::{Mode, Parameters, SLEEP_UART};
 use super::sending::Sending;
 use super::timing;
 use super::uart::Uart;
-use crate::corner::Corner;
-use crate::periph::gpio::Drive;
-use crate::time::Time;
+use f103::corner::Corner;
+use f103::periph::gpio::Drive;
+use f103::time::Time;
 
 /// A fault of a module. It stays in a power cycle. A module whose fault ends starts as at power-on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,10 +1,10 @@
 //! The air: which packets reach which receiver, collisions, losses, and the gateway.
 
 use super::host::{Host, bytes, ms};
-use crate::corner::Corner;
-use crate::periph::usart::Wire;
 use crate::radio::{Air, Packet, Parameters, timing};
-use crate::time::Time;
+use f103::corner::Corner;
+use f103::periph::usart::Wire;
+use f103::time::Time;
 
 fn normal() -> Host {
     Host::in_normal_mode(Parameters::FACTORY)

@@ -1,11 +1,11 @@
 //! A module with a host at its pins, as the part on a board is.
 
 use crate::board::Radio;
-use crate::corner::Corner;
-use crate::periph::usart::{Sent, TxPin, Wire};
 use crate::radio::{Air, Mode, Module, Parameters, timing};
-use crate::serial::{Character, Format, Framing, Receiver, Settings, Wave};
-use crate::time::Time;
+use f103::corner::Corner;
+use f103::periph::usart::{Sent, TxPin, Wire};
+use f103::serial::{Character, Format, Framing, Receiver, Settings, Wave};
+use f103::time::Time;
 
 /// A board's module, alone on the air with the gateway, and a host that drives its pins.
 pub struct Host {

@@ -1,11 +1,11 @@
 //! Power, modes, commands, and faults.
 
 use super::host::{Host, ms, near};
-use crate::periph::gpio::Drive;
-use crate::periph::usart::Wire;
 use crate::radio::{Confirmation, Fault, Mode, Parameters, timing};
-use crate::serial::{Format, Settings};
-use crate::time::Time;
+use f103::periph::gpio::Drive;
+use f103::periph::usart::Wire;
+use f103::serial::{Format, Settings};
+use f103::time::Time;
 
 const FACTORY: [u8; 6] = [0xC0, 0x00, 0x00, 0x1A, 0x17, 0x44];
 const OTHER: [u8; 6] = [0xC0, 0x00, 0x05, 0x3D, 0x0A, 0x47];

@@ -1,10 +1,10 @@
 //! Packets that a module sends and receives.
 
 use super::host::{Host, bytes, ms, near};
-use crate::corner::Corner;
-use crate::periph::usart::{TxPin, Wire};
 use crate::radio::{Mode, Packet, Parameters, Sender, timing};
-use crate::time::Time;
+use f103::corner::Corner;
+use f103::periph::usart::{TxPin, Wire};
+use f103::time::Time;
 
 /// Duration of a byte at 9600 8N1.
 fn byte() -> Time {

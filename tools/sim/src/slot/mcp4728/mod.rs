@@ -9,7 +9,7 @@
 #[cfg(test)]
 mod tests;
 
-use crate::time::Time;
+use f103::time::Time;
 
 /// Default address on the bus, 7 bits. The chip can be ordered with this and the seven following addresses.
 pub const ADDRESS: u8 = 0x60;

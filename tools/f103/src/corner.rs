@@ -1,0 +1,122 @@
+//! How a part may differ from another: the corners of its core, its clocks and its converter.
+//!
+//! A chip is created at a corner ([`crate::chip::Config::corner`]). The nominal one has every figure as typical; the
+//! other two have all of them at one end of their range at once.
+
+use core::fmt;
+use core::str::FromStr;
+
+use crate::machine::costs::Costs;
+use crate::periph::clocks::Oscillators;
+use crate::time::Time;
+
+/// A corner of the part.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Corner {
+    /// Every figure typical.
+    #[default]
+    Nominal,
+    /// Instructions and radio packets at their most, oscillators slow, the crystal slow to start.
+    Slow,
+    /// Oscillators fast; instructions as nominal.
+    Fast,
+}
+
+impl Corner {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Nominal, Self::Slow, Self::Fast];
+
+    /// Its name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Nominal => "nominal",
+            Self::Slow => "slow",
+            Self::Fast => "fast",
+        }
+    }
+
+    /// Returns what instructions cost.
+    #[must_use]
+    pub const fn costs(self) -> Costs {
+        match self {
+            Self::Slow => Costs::SLOW,
+            Self::Nominal | Self::Fast => Costs::NOMINAL,
+        }
+    }
+
+    /// Returns the oscillators, with a crystal of 8 MHz.
+    #[must_use]
+    pub const fn oscillators(self) -> Oscillators {
+        match self {
+            Self::Nominal => Oscillators::TYPICAL,
+            // The HSI over temperature: -2 and +2.5 % (DS5319 table 24); the crystal with its capacitors:
+            // 100 ppm; the LSI: 30 to 60 kHz (DS5319 table 25). For the crystal's start the data sheet has no
+            // maximum: 5 times the typical one.
+            Self::Slow => Oscillators {
+                hsi: 7_840_000,
+                hse: 7_999_200,
+                lsi: 30_000,
+                hse_start: Time::from_ms(10),
+            },
+            Self::Fast => Oscillators {
+                hsi: 8_200_000,
+                hse: 8_000_800,
+                lsi: 60_000,
+                hse_start: Time::from_us(500),
+            },
+        }
+    }
+
+    /// Returns the cycles of a timer after which the flags of an update event by software (UG) appear in SR.
+    ///
+    /// On two boards SR read 0 in the next instructions after UG (labwired-core, `f103_conformance.rs`): a delay of at
+    /// least 4 cycles at 8 MHz in this simulator. It may be more where a timer runs at twice PCLK.
+    #[must_use]
+    pub const fn ug_delay(self) -> u32 {
+        match self {
+            Self::Nominal => 0,
+            Self::Slow | Self::Fast => 16,
+        }
+    }
+
+    /// Returns how far a conversion of the ADC may be off, in LSB either way.
+    #[must_use]
+    pub const fn adc_noise(self) -> u16 {
+        match self {
+            Self::Nominal => 0,
+            Self::Slow | Self::Fast => 2,
+        }
+    }
+}
+
+impl fmt::Display for Corner {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Corner {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        Self::ALL
+            .into_iter()
+            .find(|corner| corner.name() == text)
+            .ok_or_else(|| format!("there is no corner '{text}': nominal, slow or fast"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn corners_are_found_by_their_names_and_others_are_refused() {
+        for corner in Corner::ALL {
+            assert_eq!(corner.name().parse(), Ok(corner));
+        }
+        let error = "hot".parse::<Corner>().unwrap_err();
+        assert_eq!(error, "there is no corner 'hot': nominal, slow or fast");
+    }
+}

@@ -1,0 +1,103 @@
+//! What one part of the family has and another has not: memories, pins, identity.
+//!
+//! The register blocks are those that all parts of the family have (RM0008 1.3 and table 3). A block that only a
+//! larger part has is reported by its name when it is accessed.
+
+/// The package's pins of ports A to D, one bit each.
+type Ports = [u16; 4];
+
+/// LQFP48 (DS5319 table 5).
+const LQFP48: Ports = [0xFFFF, 0xFFFF, 0xE000, 0x0003];
+/// LQFP64 (DS5792 table 5).
+const LQFP64: Ports = [0xFFFF, 0xFFFF, 0xFFFF, 0x0007];
+
+/// A part of the STM32F103 family.
+#[derive(Clone, Copy, Debug)]
+pub struct Part {
+    /// Its name.
+    pub name: &'static str,
+    /// Bytes of flash; the register of the flash's size holds them in KiB (RM0008 30.1.1).
+    pub flash_size: usize,
+    /// Bytes that a page erase erases.
+    pub page_size: usize,
+    /// Bytes of SRAM.
+    pub ram_size: usize,
+    /// The pins of each port from A on, one bit each. Pins with an analog function are inputs of ADC1.
+    pub ports: Ports,
+    /// The interrupt lines that the NVIC has.
+    pub interrupt_lines: u16,
+    /// CPUID of the core (PM0056 4.4.1).
+    pub cpuid: u32,
+    /// DBGMCU_IDCODE: device and revision (RM0008 31.6.1).
+    pub idcode: u32,
+    /// The bits that RCC_AHBENR, RCC_APB2ENR and RCC_APB1ENR keep.
+    pub clock_enables: [u32; 3],
+    /// Blocks that this part has beyond those of the medium-density parts, none of which is modelled: base
+    /// address and name.
+    pub more_blocks: &'static [(u32, &'static str)],
+}
+
+/// Medium density, 64 KiB of flash (DS5319).
+pub const STM32F103C8: Part = Part {
+    name: "STM32F103C8",
+    flash_size: 64 * 1024,
+    ..STM32F103CB
+};
+
+/// Medium density, 128 KiB of flash (DS5319; pages: PM0075 table 2; interrupts: RM0008 table 63).
+pub const STM32F103CB: Part = Part {
+    name: "STM32F103CB",
+    flash_size: 128 * 1024,
+    page_size: 1024,
+    ram_size: 20 * 1024,
+    ports: LQFP48,
+    interrupt_lines: 43,
+    // Revision r1p1.
+    cpuid: 0x411F_C231,
+    // Revision Y.
+    idcode: 0x2003_6410,
+    // Read back from two boards after all ones were written (labwired-core, stm32f1_mmio_diff.rs).
+    clock_enables: [0x55, 0x5E7D, 0x1AE6_4807],
+    more_blocks: &[],
+};
+
+/// High density, 256 KiB of flash (DS5792; pages: PM0075 table 3; interrupts: RM0008 table 63).
+pub const STM32F103RC: Part = Part {
+    name: "STM32F103RC",
+    flash_size: 256 * 1024,
+    page_size: 2 * 1024,
+    ram_size: 48 * 1024,
+    ports: LQFP64,
+    interrupt_lines: 60,
+    cpuid: 0x411F_C231,
+    // Revision Y.
+    idcode: 0x1003_6414,
+    // RM0008 7.3.6 to 7.3.8, without the bits that only connectivity-line and XL-density parts have.
+    clock_enables: [0x557, 0xFFFD, 0x3AFE_C83F],
+    more_blocks: &[
+        (0x4000_0C00, "TIM5"),
+        (0x4000_1000, "TIM6"),
+        (0x4000_1400, "TIM7"),
+        (0x4000_3C00, "SPI3"),
+        (0x4000_4C00, "UART4"),
+        (0x4000_5000, "UART5"),
+        (0x4000_7400, "DAC"),
+        (0x4001_1C00, "GPIOF"),
+        (0x4001_2000, "GPIOG"),
+        (0x4001_3400, "TIM8"),
+        (0x4001_3C00, "ADC3"),
+        (0x4001_8000, "SDIO"),
+        (0x4002_0400, "DMA2"),
+    ],
+};
+
+impl Part {
+    /// Returns the unmodelled block at `address` that only larger parts have, if this part has it.
+    #[must_use]
+    pub fn unmodelled(&self, address: u32) -> Option<&'static str> {
+        self.more_blocks
+            .iter()
+            .find(|(base, _)| address & !0x3FF == *base)
+            .map(|&(_, name)| name)
+    }
+}

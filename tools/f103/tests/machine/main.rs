@@ -1,0 +1,39 @@
+//! The part with programs written by hand: time, stalls, faults, resets, power cuts.
+
+mod asm;
+mod core;
+mod costs;
+mod crystal;
+mod debug;
+mod flash;
+mod measure;
+mod parts;
+#[allow(dead_code, reason = "the tests of boards use the other registers")]
+mod regs;
+mod resets;
+
+use asm::Asm;
+use f103::chip::Config;
+use f103::{Chip, Image, Time};
+
+/// Time from power-on to the first instruction: the reset delay of the part.
+const START: Time = Time::from_us(2_500);
+
+/// Returns a chip that runs `program`.
+fn chip(program: Asm) -> Chip<()> {
+    chip_with(&program.image(), Config::default())
+}
+
+fn chip_with(image: &Image, config: Config) -> Chip<()> {
+    Chip::in_circuit(image, config, ()).expect("the program fits")
+}
+
+/// Returns the `n`th word that a program has stored at [`regs::OUT`].
+fn out(chip: &Chip<()>, n: u32) -> u32 {
+    chip.word(regs::OUT + 4 * n).expect("in SRAM")
+}
+
+/// Returns the findings as text.
+fn findings(chip: &Chip<()>) -> Vec<String> {
+    chip.findings().iter().map(|f| f.what.to_string()).collect()
+}

@@ -1,0 +1,355 @@
+//! The command-line options of the simulator.
+
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use register_map::{Board, Module, board::MODIO_02};
+
+mod fitting;
+mod terminals;
+mod values;
+
+pub use fitting::{Fitting, toml_error};
+pub use values::slot;
+use values::{address, elf, line, unit};
+
+/// Whether the simulator has pseudo-terminals on this system. macOS has them, too, but they were never tested there.
+pub const PTY: bool = cfg!(all(unix, not(target_os = "macos")));
+
+/// The options of the simulator's command line.
+#[derive(clap::Args, Clone, Debug, PartialEq, Eq)]
+#[group(skip)]
+pub struct Options {
+    /// DIP switch SW01 as a number, 0 to 255: the unit address
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub dip: u8,
+
+    /// Type of the board: modio-02 or modio-08
+    #[arg(long, value_name = "NAME", default_value_t = &MODIO_02)]
+    pub board: &'static Board,
+
+    /// Module in the board's first slot
+    #[arg(long, value_name = "NAME", default_value = "4di")]
+    #[arg(help = format!("Module in the board's first slot: {}", Module::ALL.map(Module::name).join(", ")))]
+    pub module: Module,
+
+    /// Module in the slot at a port, such as 3=4do; may be repeated, and overrides --module for the first slot
+    #[arg(long = "slot", value_name = "PORT=MODULE", value_parser = slot)]
+    pub slots: Vec<(u8, Module)>,
+
+    /// Board on an RS-485 line with several boards, repeated: its unit address and the module in its first slot, such
+    /// as 5:4do; without a module, that of --module
+    #[arg(long = "unit", value_name = "N[:MODULE]", value_parser = unit)]
+    #[arg(conflicts_with_all = ["dip", "slots", "flash", "gdb", "exact_line"])]
+    pub units: Vec<(u8, Option<Module>)>,
+
+    /// Several boards on one RS-485 line, from a TOML file with a table for each: name, board, dip, module, slots,
+    /// flash
+    #[arg(long, value_name = "FILE")]
+    #[arg(conflicts_with_all = ["units", "board", "dip", "module", "slots", "flash", "gdb", "exact_line"])]
+    pub bus: Option<PathBuf>,
+
+    /// Corner of the part (its clocks, its ADC, the time of instructions and radio packets): nominal, slow or fast
+    #[arg(long, value_name = "NAME", default_value = "nominal", value_parser = ["nominal", "slow", "fast"])]
+    pub corner: String,
+
+    /// Store the modules of all slots in the configuration, and with --lora that the radio is on, if nothing is stored yet
+    /// (default)
+    #[arg(long, overrides_with = "no_preset")]
+    preset: bool,
+
+    /// Do not change the stored configuration
+    #[arg(long)]
+    no_preset: bool,
+
+    /// Keep the flash in FILE, so that stored settings survive; the file is made if it does not exist
+    #[arg(long, value_name = "FILE")]
+    pub flash: Option<PathBuf>,
+
+    /// Make LINK a symlink to the pseudo-terminal of the RS-485 line
+    #[arg(long, value_name = "LINK")]
+    pub pty: Option<PathBuf>,
+
+    /// Also offer the RS-485 line as raw bytes over TCP, at HOST:PORT
+    #[arg(long, value_name = "ADDR", value_parser = address)]
+    pub tcp: Option<SocketAddr>,
+
+    /// Serve Modbus TCP at HOST:PORT, as a gateway to the RS-485 line: the unit identifier is the unit address
+    #[arg(long, value_name = "ADDR", value_parser = address)]
+    pub modbus_tcp: Option<SocketAddr>,
+
+    /// Write every frame on the RS-485 line to FILE as pcapng, for Wireshark; a file that exists is replaced
+    #[arg(long, value_name = "FILE")]
+    pub record: Option<PathBuf>,
+
+    /// Offer the RS-485 line in virtual time at HOST:PORT, by the exact-line protocol of docs/conformance.md. Time
+    /// stands still between its requests, so the endpoints that follow the wall clock are not offered
+    #[arg(long, value_name = "ADDR", value_parser = address, conflicts_with_all = ["pty", "tcp", "modbus_tcp", "gdb", "lora"])]
+    pub exact_line: Option<SocketAddr>,
+
+    /// Fit a LoRa module to every board, and make LINK a symlink to a second pseudo-terminal: the serial side, 9600 8N1,
+    /// of a gateway radio on the same air
+    #[arg(long, value_name = "LINK")]
+    pub lora: Option<PathBuf>,
+
+    /// Rate and format of the line's client, such as 9600,7N2, whatever the unit does. Without this option the client
+    /// has the rate and format of the unit, except 7N2: the unit's UART is set to 8N1 then
+    #[arg(long, value_name = "RATE,FORMAT", value_parser = line)]
+    pub line: Option<(u32, String)>,
+
+    /// Let the line's client keep its own rate and format, as on a real bus: the rate that the master sets on the
+    /// pseudo-terminal, and the format that the unit has at the start. Also let the gateway radio of --lora keep its
+    /// factory parameters
+    #[arg(long, conflicts_with = "line")]
+    pub fixed_line: bool,
+
+    /// Change inputs, power and faults at given times, by a TOML file with a table for each step
+    #[arg(long, value_name = "FILE")]
+    pub scenario: Option<PathBuf>,
+
+    /// Address of the HTTP interface, HOST:PORT; with port 0 the system chooses a free port
+    #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:8502", value_parser = address)]
+    pub http: SocketAddr,
+
+    /// Serve GDB on the core, at HOST:PORT
+    #[arg(long, value_name = "ADDR", value_parser = address)]
+    pub gdb: Option<SocketAddr>,
+
+    /// Run this image instead of building one; with BOARD= only on boards of that type; may be repeated
+    #[arg(long, value_name = "[BOARD=]FILE", value_parser = elf)]
+    pub elf: Vec<(Option<&'static Board>, PathBuf)>,
+
+    /// Print the name of each board that `--elf` has no image for, and end: `cargo xtask sim` builds these images
+    #[arg(long, hide = true)]
+    pub missing_images: bool,
+
+    /// Stop after this much time, such as 10s or 2m
+    #[arg(long = "for", value_name = "DURATION", value_parser = humantime::parse_duration)]
+    pub run_for: Option<Duration>,
+}
+
+impl Options {
+    /// Whether to store the modules of all slots in the configuration if nothing is stored yet.
+    #[must_use]
+    pub fn preset(&self) -> bool {
+        !self.no_preset
+    }
+}
+
+impl Options {
+    /// Returns the image for a board: the last one for its type, or else the last one for all boards.
+    #[must_use]
+    pub fn elf_of(&self, board: &Board) -> Option<&Path> {
+        let last = |wanted: Option<&Board>| {
+            let mut named = self.elf.iter().rev();
+            named.find(|(of, _)| of.map(|of| of.name) == wanted.map(|of| of.name))
+        };
+        let (_, path) = last(Some(board)).or_else(|| last(None))?;
+        Some(path)
+    }
+
+    /// Returns the types of boards on the line that `--elf` has no image for.
+    ///
+    /// # Errors
+    ///
+    /// In one line, why the simulator cannot run with these options.
+    pub fn boards_without_image(&self) -> Result<Vec<&'static Board>, String> {
+        self.check_line()?;
+        let fittings = self.fittings()?;
+        let mut boards = Board::ALL.to_vec();
+        boards.retain(|board| {
+            let wanted = fittings.iter().any(|fitting| fitting.board == *board);
+            wanted && self.elf_of(board).is_none()
+        });
+        Ok(boards)
+    }
+}
+
+/// Returns the error of a command line as one line, without clap's hints and usage text.
+#[must_use]
+pub fn one_line(error: &clap::Error) -> String {
+    let text = error.render().to_string();
+    let what: Vec<&str> = text
+        .lines()
+        .map(str::trim)
+        .take_while(|line| !line.is_empty())
+        .collect();
+    let what = what.join(" ");
+    what.strip_prefix("error: ").unwrap_or(&what).to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+    use register_map::{board::MODIO_08, codes::Format};
+
+    #[derive(Parser)]
+    struct Cli {
+        #[command(flatten)]
+        options: Options,
+    }
+
+    pub fn parse(arguments: &[&str]) -> Result<Options, String> {
+        Cli::try_parse_from(std::iter::once(&"sim").chain(arguments))
+            .map(|cli| cli.options)
+            .map_err(|error| one_line(&error))
+    }
+
+    #[test]
+    fn default_is_unit_1_with_a_4di_and_a_preset() {
+        let options = parse(&[]).unwrap();
+        assert_eq!((options.dip, options.module), (1, Module::Di4));
+        assert_eq!(options.corner, "nominal");
+        assert_eq!(options.http, "127.0.0.1:8502".parse().unwrap());
+        assert!(options.preset());
+        assert_eq!((options.pty, options.tcp), (None, None));
+        assert!(options.elf.is_empty() && options.units.is_empty());
+        assert_eq!((options.bus, options.scenario), (None, None));
+        assert!(!options.fixed_line);
+        assert_eq!((options.flash, options.gdb), (None, None));
+        assert_eq!((options.modbus_tcp, options.record), (None, None));
+        assert_eq!((options.exact_line, options.line), (None, None));
+        assert_eq!(options.lora, None);
+        assert_eq!(options.run_for, None);
+    }
+
+    #[test]
+    fn every_module_and_every_dip_value_is_accepted() {
+        for module in Module::ALL {
+            assert_eq!(parse(&["--module", module.name()]).unwrap().module, module);
+        }
+        for dip in 0..=255_u8 {
+            assert_eq!(parse(&["--dip", &dip.to_string()]).unwrap().dip, dip);
+        }
+    }
+
+    #[test]
+    fn slot_option_names_port_and_module() {
+        assert_eq!(parse(&[]).unwrap().board.name, "modio-02");
+        let arguments = ["--board", "modio-08", "--slot", "1=4do", "--slot", "4=none"];
+        let options = parse(&arguments).unwrap();
+        assert_eq!(options.board.name, "modio-08");
+        assert_eq!(options.slots, [(1, Module::Do4), (4, Module::None)]);
+    }
+
+    #[test]
+    fn unit_option_names_an_address_and_optionally_a_module() {
+        let units = parse(&["--unit", "5:4do", "--unit", "6"]).unwrap().units;
+        assert_eq!(units, [(5, Some(Module::Do4)), (6, None)]);
+    }
+
+    #[test]
+    fn elf_option_can_name_a_type_of_board() {
+        let arguments = ["--elf", "a", "--elf", "modio-08=b", "--elf", "x=c"];
+        let options = parse(&arguments).unwrap();
+        assert_eq!(options.elf_of(&MODIO_08), Some(Path::new("b")));
+        assert_eq!(options.elf_of(&MODIO_02), Some(Path::new("x=c")));
+        let only = parse(&["--elf", "modio-08=b"]).unwrap();
+        assert_eq!(only.elf_of(&MODIO_02), None);
+    }
+
+    #[test]
+    fn boards_without_an_image_are_those_on_the_line_that_no_elf_option_names() {
+        let missing = |arguments: &[&str]| {
+            let mut options = parse(arguments).unwrap();
+            options.tcp = options.http.into();
+            options.boards_without_image()
+        };
+        assert_eq!(missing(&[]), Ok(vec![&MODIO_02]));
+        let other = ["--board", "modio-08", "--elf", "modio-02=a"];
+        assert_eq!(missing(&other), Ok(vec![&MODIO_08]));
+        assert_eq!(missing(&["--elf", "a"]), Ok(vec![]));
+        assert!(missing(&["--bus", "nowhere"]).is_err());
+    }
+
+    #[test]
+    fn last_one_of_preset_and_no_preset_counts() {
+        assert!(!parse(&["--no-preset"]).unwrap().preset());
+        assert!(parse(&["--no-preset", "--preset"]).unwrap().preset());
+        assert!(!parse(&["--preset", "--no-preset"]).unwrap().preset());
+    }
+
+    #[test]
+    fn line_option_accepts_every_format_of_the_register_map() {
+        for (_, name) in Format::NAMES {
+            let text = format!("19200,{}", name.to_lowercase());
+            let line = parse(&["--line", &text]).unwrap().line;
+            assert_eq!(line, Some((19_200, (*name).to_owned())));
+        }
+    }
+
+    #[test]
+    fn for_option_accepts_a_duration_with_units() {
+        let run_for = |text| parse(&["--for", text]).map(|options| options.run_for);
+        assert_eq!(run_for("10s"), Ok(Some(Duration::from_secs(10))));
+        assert_eq!(run_for("1m 500ms"), Ok(Some(Duration::from_millis(60_500))));
+        assert!(run_for("soon").unwrap_err().contains("'soon'"));
+    }
+
+    #[test]
+    fn wrong_value_is_reported_in_one_line() {
+        for (arguments, part) in [
+            (&["--dip", "256"][..], "256 is not in 0..=255"),
+            (&["--module", "8di"][..], "one of none, 4di"),
+            (&["--corner", "hot"][..], "nominal, slow, fast"),
+            (&["--tcp", "nowhere"][..], "not an address"),
+            (&["--http", "127.0.0.1:99999"][..], "not an address"),
+            (&["--flash"][..], "--flash <FILE>"),
+            (&["--gdb", "x"][..], "not an address"),
+            (&["--exact-line", "x"][..], "not an address"),
+            (&["--modbus-tcp", "502"][..], "not an address"),
+            (&["--modbus-tcp"][..], "--modbus-tcp <ADDR>"),
+            (&["--record"][..], "--record <FILE>"),
+            (
+                &["--exact-line", "127.0.0.1:0", "--pty", "x"][..],
+                "cannot be used with",
+            ),
+            (
+                &["--exact-line", "127.0.0.1:0", "--tcp", "127.0.0.1:0"][..],
+                "cannot be used with",
+            ),
+            (
+                &["--exact-line", "127.0.0.1:0", "--modbus-tcp", "127.0.0.1:0"][..],
+                "cannot be used with",
+            ),
+            (
+                &["--exact-line", "127.0.0.1:0", "--gdb", "127.0.0.1:0"][..],
+                "cannot be used with",
+            ),
+            (
+                &["--exact-line", "127.0.0.1:0", "--lora", "x"][..],
+                "cannot be used with",
+            ),
+            (&["--lora"][..], "--lora <LINK>"),
+            (&["--board", "modio-04"][..], "modio-02, modio-08"),
+            (&["--slot", "4do"][..], "3=4do"),
+            (&["--slot", "x=4do"][..], "3=4do"),
+            (&["--slot", "3=8di"][..], "one of none, 4di"),
+            (&["--pty"][..], "--pty <LINK>"),
+            (&["--line", "9600"][..], "9600,7N2"),
+            (&["--unit", "x"][..], "5:4do"),
+            (&["--unit", "256"][..], "5:4do"),
+            (&["--unit", "5:8di"][..], "one of none, 4di"),
+            (&["--unit", "5", "--dip", "5"][..], "cannot be used with"),
+            (&["--unit", "5", "--bus", "x"][..], "cannot be used with"),
+            (
+                &["--bus", "x", "--module", "4do"][..],
+                "cannot be used with",
+            ),
+            (
+                &["--fixed-line", "--line", "9600,8N2"][..],
+                "cannot be used with",
+            ),
+            (&["--elf", ""][..], "name of a file"),
+            (&["--elf", "modio-02="][..], "name of a file"),
+            (&["--line", "9600,7N1"][..], "9600,7N2"),
+            (&["--line", "100,8N2"][..], "9600,7N2"),
+        ] {
+            let text = parse(arguments).unwrap_err();
+            assert!(text.contains(part), "{arguments:?}: {text}");
+            assert!(!text.contains('\n'), "{text:?}");
+        }
+    }
+}
