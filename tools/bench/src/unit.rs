@@ -83,15 +83,15 @@ impl Unit {
         let mut config = Config {
             layout,
             slots: slots.collect(),
-            corner,
             ..Config::default()
         };
+        config.chip.corner = corner;
         let mut settings = vec![
             (configuration::BAUD, hundreds),
             (configuration::MODE, mode.code()),
         ];
         settings.extend(configuration::modules(config.plugged()));
-        config.flash = layout.flash_with(&settings);
+        config.chip.flash = layout.flash_with(&settings);
         let mut board = Board::new(image, config).map_err(|error| error.to_string())?;
         let settings = Settings {
             baud: u32::from(hundreds) * 100,

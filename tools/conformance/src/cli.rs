@@ -127,10 +127,7 @@ pub struct Cli {
 
 #[cfg(feature = "sim")]
 fn setting(text: &str) -> Result<(u16, u16), String> {
-    let number = |text: &str| match text.trim().strip_prefix("0x") {
-        Some(digits) => u16::from_str_radix(digits, 16).ok(),
-        None => text.trim().parse().ok(),
-    };
+    use crate::profile::number;
     text.split_once('=')
         .and_then(|(register, value)| Some((number(register)?, number(value)?)))
         .ok_or_else(|| "not REGISTER=VALUE such as 0x0107=1".to_owned())

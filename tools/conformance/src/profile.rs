@@ -182,18 +182,19 @@ fn spans(texts: &[String]) -> Result<Vec<Span>> {
     texts.iter().map(|text| span(text)).collect()
 }
 
+/// Parses `0x0010` or `16`.
+pub(crate) fn number(text: &str) -> Option<u16> {
+    let text = text.trim();
+    match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
+        Some(digits) => u16::from_str_radix(digits, 16).ok(),
+        None => text.parse().ok(),
+    }
+}
+
 /// `0x0010-0x0013`, `16-19` or `16`.
 fn span(text: &str) -> Result<Span> {
     let wrong = || format!("{text:?} is not a run of addresses such as \"0x0010-0x0013\"");
-    let number = |text: &str| {
-        let text = text.trim();
-        match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
-            Some(digits) => u16::from_str_radix(digits, 16),
-            None => text.parse(),
-        }
-        .ok()
-        .with_context(wrong)
-    };
+    let number = |text| number(text).with_context(wrong);
     let (first, last) = match text.split_once('-') {
         Some((first, last)) => (number(first)?, number(last)?),
         None => (number(text)?, number(text)?),

@@ -40,11 +40,7 @@ pub fn values(item: &Item) -> String {
     let unit = unit(item);
     match (&item.values, &item.meaning) {
         (_, Meaning::Value(modio_description::Value::Codes(names))) => {
-            let allowed = names.iter().filter(|(code, _)| {
-                item.values
-                    .as_ref()
-                    .is_none_or(|values| crate::value::allow(values, *code))
-            });
+            let allowed = names.iter().filter(|(code, _)| item.allows(*code));
             let names: Vec<_> = allowed.map(|(_, name)| name.as_str()).collect();
             names.join(" | ")
         }

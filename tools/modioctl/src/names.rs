@@ -1,6 +1,8 @@
 //! Names of points and registers: `p5.1`, `p5.1.filter`, `p5.module`, `BAUD`, or an address.
 
-use modio_description::{Description, PointKind, Reading, Register, Scope, Table, Value, Values};
+use modio_description::{
+    Description, ModuleType, PointKind, Reading, Register, Scope, Table, Value, Values,
+};
 
 use crate::failure::Failure;
 
@@ -32,6 +34,19 @@ pub struct Item {
     pub default: u16,
     /// Description in one line.
     pub about: String,
+}
+
+impl Item {
+    /// Returns whether a value is allowed. Every value is when the allowed ones are not known.
+    #[must_use]
+    pub fn allows(&self, word: u16) -> bool {
+        match &self.values {
+            None => true,
+            Some(Values::Range(min, max)) => (*min..=*max).contains(&word),
+            Some(Values::RangeOr(also, min, max)) => word == *also || (*min..=*max).contains(&word),
+            Some(Values::OneOf(values)) => values.contains(&word),
+        }
+    }
 }
 
 /// Meaning of an item's number.
@@ -93,6 +108,12 @@ impl Book {
         &self.items
     }
 
+    /// Returns the item with exactly this name.
+    #[must_use]
+    pub fn item(&self, name: &str) -> Option<&Item> {
+        self.items.iter().find(|item| item.name == name)
+    }
+
     /// Returns the description of a unit that must be a modio.
     ///
     /// # Errors
@@ -120,8 +141,6 @@ impl Book {
             return Vec::new();
         };
         let port = |port: &modio_description::Port| {
-            let mut modules = description.modules.iter();
-            let module = modules.find(|module| module.code == port.module);
             let names: Vec<_> = (1..=CHANNELS)
                 .map(|channel| format!("p{}.{channel}", port.number))
                 .collect();
@@ -129,7 +148,7 @@ impl Book {
             PortItems {
                 number: port.number,
                 code: port.module,
-                module: module.map_or_else(|| "unknown".to_owned(), |module| module.name.clone()),
+                module: module_name(description, port.module).to_owned(),
                 points: points.cloned().collect(),
             }
         };
@@ -223,6 +242,18 @@ pub fn port_of(name: &str) -> Option<u8> {
     port_number(name.trim().split_once('.')?.0)
 }
 
+/// Returns the module with this code.
+fn module(description: &Description, code: u16) -> Option<&ModuleType> {
+    let mut modules = description.modules.iter();
+    modules.find(|module| module.code == code)
+}
+
+/// Returns the name of the module with this code; `unknown` for a code without a name.
+#[must_use]
+pub fn module_name(description: &Description, code: u16) -> &str {
+    module(description, code).map_or("unknown", |module| &module.name)
+}
+
 /// Lists the ports with a slot, for people.
 #[must_use]
 pub fn slots(description: &Description) -> String {
@@ -250,11 +281,7 @@ fn unknown(address: u16) -> Item {
 /// Iterates over the points of all ports with a slot: port, channel and kind of point, in order.
 fn kinds(description: &Description) -> impl Iterator<Item = (u16, u16, &PointKind)> {
     description.ports.iter().flat_map(move |port| {
-        let module = description
-            .modules
-            .iter()
-            .find(|module| module.code == port.module);
-        let points = module.map_or([0; 4], |module| module.points);
+        let points = module(description, port.module).map_or([0; 4], |module| module.points);
         (1..).zip(points).filter_map(move |(channel, kind)| {
             let kind = description.kinds.get(usize::from(kind))?;
             Some((u16::from(port.number), channel, kind))

@@ -52,17 +52,20 @@ fn signed(word: u16, min: i32) -> i64 {
     }
 }
 
+/// Returns the number in two words, high word first.
+#[must_use]
+pub fn long(words: &[u16]) -> u32 {
+    words
+        .iter()
+        .fold(0, |long, word| long << 16 | u32::from(*word))
+}
+
 fn register(value: &Value, words: &[u16], raw: bool) -> Shown {
     let first = words.first().copied().unwrap_or_default();
     let plain = Unit::default();
     match value {
         Value::Number(unit) => number(first.into(), if raw { &plain } else { unit }),
-        Value::Long(unit) => {
-            let long = words
-                .iter()
-                .fold(0, |long, word| long << 16 | i64::from(*word));
-            number(long, if raw { &plain } else { unit })
-        }
+        Value::Long(unit) => number(long(words).into(), if raw { &plain } else { unit }),
         Value::Codes(names) if !raw => match names.iter().find(|(code, _)| *code == first) {
             Some((_, name)) => text(name.clone()),
             None => number(first.into(), &plain),
@@ -148,23 +151,26 @@ pub fn parse(item: &Item, text: &str, raw: bool) -> Result<Vec<u16>, Failure> {
     if !item.writable {
         return Err(Failure::usage(format!("{name} can only be read")));
     }
-    let wrong = |takes: String| Failure::usage(format!("{name} does not allow {text:?}: {takes}"));
+    words(item, text, raw)
+        .map_err(|takes| Failure::usage(format!("{name} does not allow {text:?}: {takes}")))
+}
+
+/// As [`parse`], for an item that can be written. The error contains only the allowed values.
+fn words(item: &Item, text: &str, raw: bool) -> Result<Vec<u16>, String> {
     let word = number_of(text);
-    let word = if raw && item.words == 1 {
-        let word = word.ok_or_else(|| wrong("--raw needs a number from 0 to 65535".to_owned()))?;
-        return check_raw(item, word).map(|()| vec![word]).map_err(wrong);
-    } else {
-        word
-    };
-    match &item.meaning {
+    if raw && item.words == 1 {
+        let word = word.ok_or("--raw needs a number from 0 to 65535")?;
+        return check_raw(item, word).map(|()| vec![word]);
+    }
+    let word = match &item.meaning {
         Meaning::Bit => match text.to_lowercase().as_str() {
-            "1" | "on" | "true" => Ok(vec![1]),
-            "0" | "off" | "false" => Ok(vec![0]),
-            _ => Err(wrong("it is on or off".to_owned())),
+            "1" | "on" | "true" => 1,
+            "0" | "off" | "false" => 0,
+            _ => return Err("it is on or off".to_owned()),
         },
         Meaning::Analog(reading) => {
             let takes = || range(reading.min.into(), reading.max.into(), &reading.unit);
-            let number = steps(text, &reading.unit).ok_or_else(|| wrong(takes()))?;
+            let number = steps(text, &reading.unit).ok_or_else(takes)?;
             let allowed = i64::from(reading.min)..=i64::from(reading.max);
             // A unit may describe a range that its register cannot have.
             let word = if reading.min < 0 {
@@ -173,69 +179,53 @@ pub fn parse(item: &Item, text: &str, raw: bool) -> Result<Vec<u16>, Failure> {
                 u16::try_from(number)
             };
             let word = word.ok().filter(|_| allowed.contains(&number));
-            Ok(vec![word.ok_or_else(|| wrong(takes()))?])
+            word.ok_or_else(takes)?
         }
         Meaning::Value(Value::Codes(names)) => {
             let wanted = text.to_lowercase();
             let named = names.iter().find(|(_, name)| name.to_lowercase() == wanted);
             let code = named.map(|(code, _)| *code).or(word);
-            let allowed = |code: &u16| {
-                item.values
-                    .as_ref()
-                    .is_none_or(|values| allow(values, *code))
-            };
-            let code = code.filter(|code| allowed(code)).ok_or_else(|| {
-                let takes = names.iter().filter(|(code, _)| allowed(code));
+            code.filter(|code| item.allows(*code)).ok_or_else(|| {
+                let takes = names.iter().filter(|(code, _)| item.allows(*code));
                 let takes: Vec<_> = takes
                     .map(|(code, name)| format!("{code} = {name}"))
                     .collect();
-                wrong(format!("it takes {}", takes.join(", ")))
-            })?;
-            Ok(vec![code])
+                format!("it takes {}", takes.join(", "))
+            })?
         }
         Meaning::Value(Value::Number(unit)) => {
-            let takes = || {
-                item.values.as_ref().map_or_else(
-                    || "it takes 0 to 65535".to_owned(),
-                    |values| takes(values, unit),
-                )
-            };
             // A value outside the unit's range, such as 0xFFFF for hold, is written unchanged.
             let word = match text.get(..2) {
                 Some("0x" | "0X") => word.map(i64::from),
                 _ => steps(text, unit),
             };
             let word = word.and_then(|word| u16::try_from(word).ok());
-            let allowed = |word: &u16| {
-                item.values
-                    .as_ref()
-                    .is_none_or(|values| allow(values, *word))
-            };
-            word.filter(allowed)
-                .map(|word| vec![word])
-                .ok_or_else(|| wrong(takes()))
+            word.filter(|word| item.allows(*word))
+                .ok_or_else(|| match &item.values {
+                    Some(values) => takes(values, unit),
+                    None => "it takes 0 to 65535".to_owned(),
+                })?
         }
-        Meaning::Value(Value::Long(_)) => match text {
+        Meaning::Value(Value::Long(_)) => {
             // The only long value that can be written is 0, which clears a counter.
-            "0" => Ok(vec![0; usize::from(item.words)]),
-            _ => Err(wrong("it can only be cleared, by 0".to_owned())),
-        },
-        Meaning::Value(Value::Bits(_)) => word
-            .map(|word| vec![word])
-            .ok_or_else(|| wrong("it takes a number".to_owned())),
-        Meaning::Value(Value::Opaque) => {
-            Err(wrong("it has no values that can be written".to_owned()))
+            return match text {
+                "0" => Ok(vec![0; usize::from(item.words)]),
+                _ => Err("it can only be cleared, by 0".to_owned()),
+            };
         }
-        Meaning::Unknown => word
-            .map(|word| vec![word])
-            .ok_or_else(|| wrong("it takes 0 to 65535".to_owned())),
-    }
+        Meaning::Value(Value::Bits(_)) => word.ok_or("it takes a number")?,
+        Meaning::Value(Value::Opaque) => {
+            return Err("it has no values that can be written".to_owned());
+        }
+        Meaning::Unknown => word.ok_or("it takes 0 to 65535")?,
+    };
+    Ok(vec![word])
 }
 
 fn check_raw(item: &Item, word: u16) -> Result<(), String> {
     match (&item.meaning, &item.values) {
         (Meaning::Bit, _) if word > 1 => Err("a bit is 0 or 1".to_owned()),
-        (_, Some(values)) if !allow(values, word) => Err(takes(values, &Unit::default())),
+        (_, Some(values)) if !item.allows(word) => Err(takes(values, &Unit::default())),
         _ => Ok(()),
     }
 }
@@ -253,16 +243,6 @@ fn steps(text: &str, unit: &Unit) -> Option<i64> {
     let whole = steps.round();
     let near = (steps - whole).abs() < 1e-6 && whole.abs() < 1e9;
     near.then_some(whole as i64 - i64::from(unit.offset))
-}
-
-/// Returns whether a register allows a value.
-#[must_use]
-pub fn allow(values: &Values, word: u16) -> bool {
-    match values {
-        Values::Range(min, max) => (*min..=*max).contains(&word),
-        Values::RangeOr(also, min, max) => word == *also || (*min..=*max).contains(&word),
-        Values::OneOf(values) => values.contains(&word),
-    }
 }
 
 /// Describes the values that a register allows, in its unit.

@@ -152,12 +152,12 @@ fn bus(image: &Image, boards: u8, radio: Option<Parameters>, baud: u32) -> Resul
         .chain([(configuration::BAUD, (baud / 100) as u16)])
         .collect();
     let boards = (1..=boards).map(|dip| {
-        let config = Config {
+        let mut config = Config {
             dip,
             radio,
-            flash: MODIO_02.flash_with(&settings),
             ..Config::default()
         };
+        config.chip.flash = MODIO_02.flash_with(&settings);
         Board::new(image, config)
     });
     let mut bus = Bus::new(boards.collect::<Result<_, _>>()?);

@@ -76,7 +76,7 @@ pub fn start(fitting: &Fitting) -> Result<ExactLine<InProcess>, Broken> {
         slots: fitting.slots.clone(),
         ..Config::default()
     };
-    config.flash = Some(flash(fitting, &config)?);
+    config.chip.flash = Some(flash(fitting, &config)?);
     let mut board = Board::new(&image, config).map_err(|e| Broken(e.to_string()))?;
     board.run_for(START);
     let mut server = InProcess {

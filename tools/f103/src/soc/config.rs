@@ -31,6 +31,17 @@ pub struct Config {
     pub new_core: bool,
 }
 
+impl Config {
+    /// The default configuration with these contents of the flash.
+    #[must_use]
+    pub fn holding(flash: Vec<u8>) -> Self {
+        Self {
+            flash: Some(flash),
+            ..Self::default()
+        }
+    }
+}
+
 impl Default for Config {
     fn default() -> Self {
         Self {

@@ -1,5 +1,6 @@
 //! `modioctl module`, `reboot` and `identify`: commands that the unit executes.
 
+use register_map::codes::Command;
 use register_map::{points, state};
 
 use crate::cli::Module;
@@ -8,9 +9,6 @@ use crate::failure::Failure;
 use crate::names::slots;
 use crate::output;
 use crate::value::{parse, show};
-
-/// COMMAND 6: all LEDs blink.
-const IDENTIFY: u16 = 6;
 
 /// Sets up a slot for a module.
 ///
@@ -87,7 +85,10 @@ pub async fn reboot(mut device: Device) -> Result<(), Failure> {
 pub async fn identify(device: &mut Device) -> Result<(), Failure> {
     device.unlock().await?;
     device
-        .order(IDENTIFY, "blinking (older firmware does not support it)")
+        .order(
+            Command::Identify.code(),
+            "blinking (older firmware does not support it)",
+        )
         .await?;
     output::line(format_args!(
         "all LEDs of unit {} blink for 10 s",

@@ -21,25 +21,34 @@ pub async fn run(device: &mut Device, options: &Read, json: bool) -> Result<(), 
         .iter()
         .map(|name| book.find(name))
         .collect::<Result<_, _>>()?;
-    let values = device.read_items(&items).await?;
+    print(device, &items, options.raw, json).await
+}
+
+/// Reads items and prints their values. With `raw` they are numbers without meaning.
+///
+/// # Errors
+///
+/// When the unit does not answer or refuses.
+pub async fn print(
+    device: &mut Device,
+    items: &[Item],
+    raw: bool,
+    json: bool,
+) -> Result<(), Failure> {
+    let values = device.read_items(items).await?;
     let both = items.iter().zip(&values);
     if json {
-        let each = both.map(|(item, words)| as_json(item, words, options.raw));
+        let each = both.map(|(item, words)| as_json(item, words, raw));
         return output::json(&each.collect::<Vec<_>>());
     }
     let rows: Vec<_> = both
-        .map(|(item, words)| {
-            [
-                item.name.clone(),
-                show(item, words, options.raw).to_string(),
-            ]
-        })
+        .map(|(item, words)| [item.name.clone(), show(item, words, raw).to_string()])
         .collect();
     output::table(&rows)
 }
 
 /// Returns an item with its value, for programs.
-pub fn as_json(item: &Item, words: &[u16], raw: bool) -> Json {
+fn as_json(item: &Item, words: &[u16], raw: bool) -> Json {
     let shown = show(item, words, raw);
     json!({
         "name": item.name,

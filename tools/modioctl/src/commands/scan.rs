@@ -12,6 +12,7 @@ use crate::bus::{Endpoint, Found, LONG, Lost, Master, Observer, Place, REPORT, S
 use crate::cli::Scan;
 use crate::device::{Device, known, place};
 use crate::failure::Failure;
+use crate::names::module_name;
 use crate::output;
 
 /// Shortest time that is worth an announcement.
@@ -296,14 +297,8 @@ async fn look_at(device: &mut Device) -> Result<Unit, Failure> {
     let modules = match description {
         None => String::new(),
         Some(description) => {
-            let name = |code| {
-                description
-                    .modules
-                    .iter()
-                    .find(|module| module.code == code)
-            };
             let ports = description.ports.iter().map(|port| {
-                let name = name(port.module).map_or("unknown", |module| &module.name);
+                let name = module_name(&description, port.module);
                 format!("p{} {name}", port.number)
             });
             ports.collect::<Vec<_>>().join(", ")

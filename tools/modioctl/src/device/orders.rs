@@ -13,6 +13,7 @@ use crate::bus::adu::Framing;
 use crate::bus::endpoint::{Endpoint, RATES};
 use crate::failure::Failure;
 use crate::output;
+use crate::value::long;
 
 /// Time limit for a save, which erases two pages and writes a change.
 const SAVING: Duration = Duration::from_secs(3);
@@ -167,9 +168,7 @@ impl Device {
 
     async fn uptime(&mut self) -> Result<u32, Failure> {
         let words = self.read_words(state::UPTIME, 2).await?;
-        Ok(words
-            .iter()
-            .fold(0, |long, word| long << 16 | u32::from(*word)))
+        Ok(long(&words))
     }
 }
 

@@ -17,6 +17,7 @@ use crate::bus::adu::Framing;
 use crate::failure::Failure;
 use crate::names::{Item, Meaning};
 
+/// TOML has no value for `None`: the serialiser leaves such an entry out.
 #[derive(Serialize)]
 struct File {
     inputs: Inputs,
@@ -33,18 +34,13 @@ struct Modbus {
     timeout: String,
     busy_retries: u8,
     controller: String,
-    #[serde(skip_serializing_if = "Option::is_none")]
     baud_rate: Option<u32>,
-    #[serde(skip_serializing_if = "Option::is_none")]
     data_bits: Option<u8>,
-    #[serde(skip_serializing_if = "Option::is_none")]
     parity: Option<char>,
-    #[serde(skip_serializing_if = "Option::is_none")]
     stop_bits: Option<u8>,
     transmission_mode: &'static str,
     configuration_type: &'static str,
     metric: Vec<Metric>,
-    #[serde(skip_serializing_if = "Option::is_none")]
     workarounds: Option<Workarounds>,
 }
 
@@ -67,11 +63,9 @@ struct Field {
     register: &'static str,
     address: u16,
     name: String,
-    #[serde(rename = "type", skip_serializing_if = "Option::is_none")]
+    #[serde(rename = "type")]
     data_type: Option<&'static str>,
-    #[serde(skip_serializing_if = "Option::is_none")]
     scale: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
     output: Option<&'static str>,
 }
 

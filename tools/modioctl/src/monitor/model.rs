@@ -265,11 +265,7 @@ impl Model {
     #[must_use]
     pub fn status(&self, now: Instant) -> Option<String> {
         let (value, _) = self.value("status", now).filter(|(_, fresh)| *fresh)?;
-        let item = self
-            .book
-            .items()
-            .iter()
-            .find(|item| item.name == "status")?;
+        let item = self.book.item("status")?;
         let is_set = value.words.iter().any(|word| *word != 0);
         is_set.then(|| show(item, &value.words, false).to_string())
     }

@@ -41,25 +41,25 @@ impl Plan {
     #[must_use]
     pub fn new(book: &Book) -> Self {
         let ports = book.ports();
-        let found = |name: String| book.items().iter().find(|item| item.name == name).cloned();
+        let found = |name: &str| book.item(name).cloned();
         let mut state: Vec<_> = ["uptime", "status"]
             .iter()
-            .filter_map(|name| found((*name).to_owned()))
+            .filter_map(|name| found(name))
             .collect();
         let mut settings = Vec::new();
         for port in &ports {
             for name in ["module", "module_in_force", "module_state"] {
-                state.extend(found(format!("p{}.{name}", port.number)));
+                state.extend(found(&format!("p{}.{name}", port.number)));
             }
             for point in &port.points {
-                state.extend(found(format!("{}.channel_status", point.name)));
+                state.extend(found(&format!("{}.channel_status", point.name)));
                 if matches!(point.meaning, Meaning::Analog(_) | Meaning::Unknown) {
-                    settings.extend(found(format!("{}.range", point.name)));
-                    settings.extend(found(format!("{}.scale", point.name)));
+                    settings.extend(found(&format!("{}.range", point.name)));
+                    settings.extend(found(&format!("{}.scale", point.name)));
                 }
             }
         }
-        let counters = COUNTERS.iter().filter_map(|name| found((*name).to_owned()));
+        let counters = COUNTERS.iter().filter_map(|name| found(name));
         Self {
             counters: counters.collect(),
             ports,

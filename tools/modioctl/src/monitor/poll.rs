@@ -12,6 +12,7 @@ use crate::bus::{Endpoint, Observer};
 use crate::device::{Device, fetch};
 use crate::failure::Failure;
 use crate::names::{Item, PortItems};
+use crate::value::long;
 
 /// Longest time from the order of a write to its request. An older order is not sent, because an output must not
 /// switch when the user no longer expects it.
@@ -192,9 +193,7 @@ impl Poller {
         let Some(uptime) = words.get("uptime") else {
             return;
         };
-        let now = uptime
-            .iter()
-            .fold(0, |long: u64, word| long << 16 | u64::from(*word));
+        let now = u64::from(long(uptime));
         if let Some((before, at)) = self.uptime {
             // A unit on its internal oscillator may count a few per cent slower.
             let least = before.saturating_add(at.elapsed().as_secs() * 9 / 10);

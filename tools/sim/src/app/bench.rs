@@ -138,13 +138,11 @@ impl Bench {
                 port,
                 channel,
                 change,
-            } => board
-                .change_slot(port.unwrap_or(first), |slot| match change {
-                    Change::Energised(on) => slot.set_energised(channel, on),
-                    Change::Manual(on) => slot.set_manual(channel, on),
-                    Change::Millivolts(millivolts) => slot.set_millivolts(channel, millivolts),
-                })?
-                .map_err(Error::from)?,
+            } => board.change_slot(port.unwrap_or(first), |slot| match change {
+                Change::Energised(on) => slot.set_energised(channel, on),
+                Change::Manual(on) => slot.set_manual(channel, on),
+                Change::Millivolts(millivolts) => slot.set_millivolts(channel, millivolts),
+            })??,
             Action::Dip(dip) => board.set_dip(dip),
             Action::PowerOn => board.power_on(),
             Action::PowerOff => board.power_off(),

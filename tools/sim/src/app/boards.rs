@@ -72,17 +72,17 @@ fn config(
         module: fitting.module,
         slots: fitting.slots.clone(),
         radio: options.lora.as_ref().map(|_| Parameters::FACTORY),
-        corner: options.corner,
         ..Config::default()
     };
+    config.chip.corner = options.corner;
     // Give each part its own unique identity and its own random seed.
-    let [.., last] = &mut config.unique_id;
+    let [.., last] = &mut config.chip.unique_id;
     *last = last.wrapping_add(number - 1);
-    config.seed += u64::from(number - 1);
+    config.chip.seed += u64::from(number - 1);
     if options.preset() {
         write_preset(&config, &mut flash);
     }
-    config.flash = Some(flash);
+    config.chip.flash = Some(flash);
     Ok((config, file))
 }
 

@@ -55,7 +55,9 @@ impl Modio {
             slots: slots.collect(),
             dip: config.dip,
             dip_at_power_on: config.dip,
-            radio: config.radio.map(|stored| Radio::new(stored, config.corner)),
+            radio: config
+                .radio
+                .map(|stored| Radio::new(stored, config.chip.corner)),
             addressed: None,
         }
     }

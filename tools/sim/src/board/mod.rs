@@ -18,7 +18,7 @@ pub use radio::{Radio, RadioPins};
 use core::ops::{Deref, DerefMut};
 
 use crate::error::Error;
-use f103::{Chip, Image, Time};
+use f103::{Chip, Image, Time, chip};
 
 /// A virtual modio board: a chip in the circuit of a modio board.
 #[derive(Debug)]
@@ -43,7 +43,7 @@ impl Board {
     ///
     /// # Errors
     ///
-    /// [`f103::Error::Image`] if the image does not fit into the flash or `config.flash` has another size, [`Error::Slot`] if
+    /// [`f103::Error::Image`] if the image does not fit into the flash or `config.chip.flash` has another size, [`Error::Slot`] if
     /// `config.slots` names a slot that the board does not have.
     pub fn new(image: &Image, config: Config) -> Result<Self, Error> {
         let ports = config.layout.slots.iter().map(|slot| slot.port);
@@ -52,7 +52,11 @@ impl Board {
             return Err(Error::Slot(port));
         }
         let circuit = Modio::new(&config);
-        Ok(Self(Chip::in_circuit(image, config.chip(), circuit)?))
+        let chip = chip::Config {
+            part: &config.layout.part,
+            ..config.chip
+        };
+        Ok(Self(Chip::in_circuit(image, chip, circuit)?))
     }
 
     /// As [`Chip::run_until`]. A method of the board itself, so that the argument may borrow what contains the board.

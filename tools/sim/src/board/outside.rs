@@ -75,7 +75,7 @@ impl Board {
     ///
     /// [`Error::Channel`] if this channel is not a digital input.
     pub fn set_energised(&mut self, ch: usize, energised: bool) -> Result<(), Error> {
-        Ok(self.with_slot(|slot| slot.set_energised(ch, energised))?)
+        self.with_slot(|slot| slot.set_energised(ch, energised))
     }
 
     /// Sets the jumper of relay `ch` (1 or 2) of the first slot to manual or to automatic.
@@ -84,7 +84,7 @@ impl Board {
     ///
     /// [`Error::Channel`] if this channel is not a relay.
     pub fn set_manual(&mut self, ch: usize, manual: bool) -> Result<(), Error> {
-        Ok(self.with_slot(|slot| slot.set_manual(ch, manual))?)
+        self.with_slot(|slot| slot.set_manual(ch, manual))
     }
 
     /// Sets the voltage at the pin of the analog input of channel `ch` (1 to 4) of the first slot, 0 to 3300 mV.
@@ -93,7 +93,7 @@ impl Board {
     ///
     /// [`Error::Channel`] if this channel is not an analog input, [`Error::Range`] above 3300 mV.
     pub fn set_millivolts(&mut self, ch: usize, millivolts: u16) -> Result<(), Error> {
-        Ok(self.with_slot(|slot| slot.set_millivolts(ch, millivolts))?)
+        self.with_slot(|slot| slot.set_millivolts(ch, millivolts))
     }
 
     /// Sets the source impedance of the analog input of channel `ch` (1 to 4) of the first slot, in ohms.
@@ -102,7 +102,7 @@ impl Board {
     ///
     /// [`Error::Channel`] if this channel is not an analog input.
     pub fn set_source_ohms(&mut self, ch: usize, ohms: u32) -> Result<(), Error> {
-        Ok(self.with_slot(|slot| slot.set_source_ohms(ch, ohms))?)
+        self.with_slot(|slot| slot.set_source_ohms(ch, ohms))
     }
 
     /// Causes or clears a fault of the I2C bus in the first slot.

@@ -1,6 +1,4 @@
-//! The state of a channel, and the reason why a change of it is refused.
-
-use core::fmt;
+//! The state of a channel.
 
 /// Highest voltage at the pin of an analog input, in mV: full scale of the module's circuit.
 pub const MAX_MILLIVOLTS: u16 = 3300;
@@ -38,23 +36,3 @@ pub enum Channel {
         code: u16,
     },
 }
-
-/// Reason why a change of a channel is refused.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Error {
-    /// The module has no such input on this channel.
-    Channel,
-    /// The voltage is higher than [`MAX_MILLIVOLTS`].
-    Millivolts,
-}
-
-impl fmt::Display for Error {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Channel => f.write_str("the plugged module has no such input on this channel"),
-            Self::Millivolts => write!(f, "an analog input takes 0 to {MAX_MILLIVOLTS} mV"),
-        }
-    }
-}
-
-impl std::error::Error for Error {}

@@ -17,9 +17,11 @@ pub mod mcp4728;
 #[cfg(test)]
 mod tests;
 
-pub use channel::{Channel, Error, MAX_MILLIVOLTS};
+pub use channel::{Channel, MAX_MILLIVOLTS};
 use mcp4728::{Mcp4728, Setting};
 use register_map::Module;
+
+use crate::error::Error;
 use register_map::points::Kind;
 
 use f103::periph::gpio::Drive;
@@ -186,10 +188,12 @@ impl Slot {
     ///
     /// # Errors
     ///
-    /// [`Error::Channel`] if this channel is not an analog input, [`Error::Millivolts`] above 3300 mV.
+    /// [`Error::Channel`] if this channel is not an analog input, [`Error::Range`] above 3300 mV.
     pub fn set_millivolts(&mut self, ch: usize, millivolts: u16) -> Result<(), Error> {
         match self.channel(ch) {
-            Channel::Ai { .. } if millivolts > MAX_MILLIVOLTS => return Err(Error::Millivolts),
+            Channel::Ai { .. } if millivolts > MAX_MILLIVOLTS => {
+                return Err(Error::Range("an analog input takes 0 to 3300 mV"));
+            }
             Channel::Ai { .. } => self.millivolts[ch - 1] = millivolts,
             _ => return Err(Error::Channel),
         }

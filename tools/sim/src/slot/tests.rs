@@ -21,7 +21,10 @@ fn channels_accept_only_changes_of_their_own_kind() {
 
     slot.set_module(Module::Ai2Ao2);
     assert_eq!(slot.set_millivolts(2, 3300), Ok(()));
-    assert_eq!(slot.set_millivolts(2, 3301), Err(Error::Millivolts));
+    assert_eq!(
+        slot.set_millivolts(2, 3301),
+        Err(Error::Range("an analog input takes 0 to 3300 mV"))
+    );
     assert_eq!(slot.set_millivolts(3, 0), Err(Error::Channel));
     assert_eq!(slot.channel(2), Channel::Ai { millivolts: 3300 });
     assert_eq!(slot.channel(3), Channel::Ao { code: 0 });

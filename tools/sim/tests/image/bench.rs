@@ -139,7 +139,7 @@ impl Bench {
         Self::with(Config {
             dip,
             module,
-            flash: Some(flash_with(module)),
+            chip: sim::chip::Config::holding(flash_with(module)),
             ..Config::default()
         })
     }
@@ -149,7 +149,7 @@ impl Bench {
         let pairs = [&[(MODULE, module.code())], settings].concat();
         let mut bench = Self::with(Config {
             module,
-            flash: Some(flash_with_settings(&pairs)),
+            chip: sim::chip::Config::holding(flash_with_settings(&pairs)),
             ..Config::default()
         });
         let stored = |address| pairs.iter().find(|pair| pair.0 == address);
@@ -168,12 +168,9 @@ impl Bench {
     }
 
     /// Returns a board that was powered just now, at the corner at which the tests run.
-    pub fn cold(config: Config) -> Self {
-        let config = Config {
-            corner: corner(),
-            layout: LAYOUT,
-            ..config
-        };
+    pub fn cold(mut config: Config) -> Self {
+        config.layout = LAYOUT;
+        config.chip.corner = corner();
         Self {
             board: Board::new(image(), config).expect("the image fits"),
             settings: Settings::default(),

@@ -36,7 +36,7 @@ fn unit_reports_the_commit_that_it_was_built_from() {
 #[ignore = "needs the image: cargo xtask test"]
 fn unit_answers_within_a_hundred_milliseconds_of_power_on() {
     let mut bench = Bench::cold(Config {
-        flash: Some(flash_with(Module::Di4)),
+        chip: sim::chip::Config::holding(flash_with(Module::Di4)),
         ..Config::default()
     });
     bench.board.run_for(Time::from_ms(80));
@@ -47,8 +47,10 @@ fn unit_answers_within_a_hundred_milliseconds_of_power_on() {
 #[ignore = "needs the image: cargo xtask test"]
 fn without_a_crystal_the_unit_logs_it_and_runs_on_the_internal_oscillator() {
     let mut bench = Bench::with(Config {
-        crystal: false,
-        flash: Some(flash_with(Module::Di4)),
+        chip: sim::chip::Config {
+            crystal: false,
+            ..sim::chip::Config::holding(flash_with(Module::Di4))
+        },
         ..Config::default()
     });
     bench.board.run_for(Time::from_ms(500));
@@ -143,7 +145,7 @@ fn boot_loader(entry: u32) -> Vec<u8> {
 fn image_entered_with_the_pll_running_waits_until_the_pll_has_stopped() {
     const LOADER: u32 = 0x2000_4800;
     let mut bench = Bench::cold(Config {
-        flash: Some(flash_with(Module::Di4)),
+        chip: sim::chip::Config::holding(flash_with(Module::Di4)),
         ..Config::default()
     });
     let entry = bench.board.word(0x0800_0004).unwrap() & !1;
@@ -167,7 +169,7 @@ fn lsi_ms(milliseconds: u64) -> Time {
 fn start_that_hangs_is_reset_by_the_watchdog() {
     let cold = || {
         Bench::cold(Config {
-            flash: Some(flash_with(Module::Di4)),
+            chip: sim::chip::Config::holding(flash_with(Module::Di4)),
             ..Config::default()
         })
     };

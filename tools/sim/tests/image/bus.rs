@@ -22,9 +22,11 @@ fn board_with(dip: u8, module: Module) -> Board {
     let config = Config {
         dip,
         module,
-        flash: Some(flash_with(module)),
         layout: LAYOUT,
-        corner: corner(),
+        chip: sim::chip::Config {
+            corner: corner(),
+            ..sim::chip::Config::holding(flash_with(module))
+        },
         ..Config::default()
     };
     Board::new(image(), config).expect("the image fits")

@@ -13,9 +13,12 @@ const INTERNAL: u16 = 1 << 6;
 const CRYSTAL: u16 = 4;
 
 fn without_crystal(settings: &[(u16, u16)]) -> Bench {
+    let flash = flash_with_settings(&[&[(MODULE, 2)], settings].concat());
     Bench::with(Config {
-        crystal: false,
-        flash: Some(flash_with_settings(&[&[(MODULE, 2)], settings].concat())),
+        chip: sim::chip::Config {
+            crystal: false,
+            ..sim::chip::Config::holding(flash)
+        },
         module: Module::Do4,
         ..Config::default()
     })

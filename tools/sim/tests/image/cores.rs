@@ -46,8 +46,10 @@ impl State {
 
 fn config(new_core: bool) -> Config {
     Config {
-        flash: Some(flash_with(Module::Di4)),
-        new_core,
+        chip: sim::chip::Config {
+            new_core,
+            ..sim::chip::Config::holding(flash_with(Module::Di4))
+        },
         ..Config::default()
     }
 }
@@ -97,14 +99,14 @@ fn leave_a_core(left: usize) {
     } else {
         Corner::Slow
     };
-    let config = Config {
-        corner,
+    let mut config = Config {
         layout: LAYOUT,
-        crystal: left.is_multiple_of(2),
         dip: 0xFF,
         module: Module::Ao4,
         ..config(false)
     };
+    config.chip.corner = corner;
+    config.chip.crystal = left.is_multiple_of(2);
     let mut board = Board::new(image(), config).expect("the image fits");
     board.run_for(Time::from_ms(60));
     // Replace the code that the core runs: in flash from its first instruction on, and in SRAM.

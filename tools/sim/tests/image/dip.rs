@@ -78,7 +78,7 @@ fn the_switch_is_read_only_at_power_on() {
 fn switch_that_bounces_at_power_on_is_read_once_it_is_stable() {
     let mut bench = Bench::cold(Config {
         dip: 17,
-        flash: Some(flash_with(Module::Di4)),
+        chip: sim::chip::Config::holding(flash_with(Module::Di4)),
         ..Config::default()
     });
     for (until_ms, dip) in [(4, 17), (9, 19), (10, 17), (12, 19), (15, 17), (18, 16)] {
@@ -95,7 +95,7 @@ fn switch_that_bounces_at_power_on_is_read_once_it_is_stable() {
 fn switch_that_never_is_stable_does_not_keep_the_unit_from_starting() {
     let mut bench = Bench::cold(Config {
         dip: 17,
-        flash: Some(flash_with(Module::Di4)),
+        chip: sim::chip::Config::holding(flash_with(Module::Di4)),
         ..Config::default()
     });
     while bench.board.now() < Time::from_ms(150) {

@@ -101,7 +101,7 @@ fn save_pauses_when_the_supply_falls_between_two_operations() {
 #[ignore = "needs the image: cargo xtask test"]
 fn start_with_a_low_supply_serves_and_changes_no_flash() {
     let mut bench = Bench::cold(Config {
-        flash: Some(flash_with_settings(&[(MODULE, 1)])),
+        chip: sim::chip::Config::holding(flash_with_settings(&[(MODULE, 1)])),
         ..Config::default()
     });
     bench.board.set_supply_mv(LOW_MV).unwrap();

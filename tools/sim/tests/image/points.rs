@@ -152,7 +152,7 @@ fn broadcast_is_executed_without_a_reply() {
 fn outputs_are_off_from_the_first_instant_and_after_every_power_on() {
     let mut bench = Bench::cold(sim::Config {
         module: Module::Do4,
-        flash: Some(crate::bench::flash_with(Module::Do4)),
+        chip: sim::chip::Config::holding(crate::bench::flash_with(Module::Do4)),
         ..sim::Config::default()
     });
     for pin in 0..4 {

@@ -57,7 +57,9 @@ impl Loaded {
         ];
         let mut bench = Bench::with(Config {
             module: Module::Ai2Ao2,
-            flash: Some(flash_with_settings(&[&settings, &large()[..]].concat())),
+            chip: sim::chip::Config::holding(flash_with_settings(
+                &[&settings, &large()[..]].concat(),
+            )),
             radio: Some(Parameters::FACTORY),
             ..Config::default()
         });

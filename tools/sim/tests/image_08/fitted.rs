@@ -24,7 +24,7 @@ pub fn fitted(plugged: [Module; 4], settings: &[(u16, u16)]) -> Bench {
     Bench::with(Config {
         layout: LAYOUT,
         slots,
-        flash: Some(flash_with_settings(&stored)),
+        chip: sim::chip::Config::holding(flash_with_settings(&stored)),
         ..Config::default()
     })
 }

@@ -46,7 +46,14 @@ pub async fn run(
     // Settings by point belong to the module that is set, which may not be in force yet.
     let book = of_modules(&book, set)?;
     match options {
-        Config::Get { names } => get(&mut device, &book, &names, json).await,
+        Config::Get { names } => {
+            let named = names.iter().map(|name| book.find(name));
+            let mut items: Vec<_> = named.collect::<Result<_, _>>()?;
+            if names.is_empty() {
+                items = book.settings().cloned().collect();
+            }
+            read::print(&mut device, &items, false, json).await
+        }
         Config::Set { values } => {
             let changes = values
                 .iter()
@@ -116,32 +123,6 @@ async fn settings(device: &mut Device, book: &Book) -> Result<(Vec<Item>, Vec<Ve
     let items: Vec<_> = book.settings().cloned().collect();
     let values = device.read_items(&items).await?;
     Ok((items, values))
-}
-
-async fn get(
-    device: &mut Device,
-    book: &Book,
-    names: &[String],
-    json: bool,
-) -> Result<(), Failure> {
-    let items: Vec<_> = if names.is_empty() {
-        book.settings().cloned().collect()
-    } else {
-        names
-            .iter()
-            .map(|name| book.find(name))
-            .collect::<Result<_, _>>()?
-    };
-    let values = device.read_items(&items).await?;
-    let both = items.iter().zip(&values);
-    if json {
-        let each = both.map(|(item, words)| read::as_json(item, words, false));
-        return output::json(&each.collect::<Vec<_>>());
-    }
-    let rows: Vec<_> = both
-        .map(|(item, words)| [item.name.clone(), show(item, words, false).to_string()])
-        .collect();
-    output::table(&rows)
 }
 
 /// Settings that are being written.

@@ -132,7 +132,7 @@ fn judged(model: &Model, name: &str, now: Instant) -> (String, Style) {
     let Some((value, fresh)) = model.value(name, now) else {
         return (String::new(), OLD);
     };
-    let item = model.book.items().iter().find(|item| item.name == name);
+    let item = model.book.item(name);
     let text = item.map_or_else(String::new, |item| {
         show(item, &value.words, false).to_string()
     });

@@ -54,11 +54,12 @@ mod tests {
 
     fn framing(dip: u8, stored: u16, format: Format) -> Framing {
         let layout = Config::default().layout;
-        let mut bench = bench_of(Config {
+        let mut config = Config {
             dip,
-            flash: layout.flash_with(&[(configuration::MODE, stored)]),
             ..Config::default()
-        });
+        };
+        config.chip.flash = layout.flash_with(&[(configuration::MODE, stored)]);
+        let mut bench = bench_of(config);
         let mut mode = Mode::default();
         mode.update(bench.bus.board(0));
         // The firmware reads the switch at power-on only.

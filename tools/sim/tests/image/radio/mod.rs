@@ -24,7 +24,7 @@ fn starting(module: Parameters, settings: &[(u16, u16)]) -> Bench {
     let all = [&[(MODULE, Module::Di4.code()), (LORA, 1)], settings].concat();
     Bench::with(Config {
         module: Module::Di4,
-        flash: Some(flash_with_settings(&all)),
+        chip: sim::chip::Config::holding(flash_with_settings(&all)),
         radio: Some(module),
         ..Config::default()
     })

@@ -82,7 +82,7 @@ fn settings_apply_after_a_save_and_a_restart() {
 #[ignore = "needs the image: cargo xtask test"]
 fn radio_that_is_off_leaves_its_pins_alone() {
     let mut bench = Bench::with(Config {
-        flash: Some(flash_with_settings(&[(MODULE, Module::Di4.code())])),
+        chip: sim::chip::Config::holding(flash_with_settings(&[(MODULE, Module::Di4.code())])),
         radio: Some(Parameters::FACTORY),
         ..Config::default()
     });
@@ -101,7 +101,7 @@ fn radio_is_off_in_recovery_mode_and_without_a_unit_address() {
         let all = [(MODULE, Module::Di4.code()), (LORA, 1)];
         let mut bench = Bench::with(Config {
             dip,
-            flash: Some(flash_with_settings(&all)),
+            chip: sim::chip::Config::holding(flash_with_settings(&all)),
             radio: Some(Parameters::FACTORY),
             ..Config::default()
         });

@@ -38,10 +38,12 @@ impl Air {
             let config = Config {
                 dip,
                 module: Module::Di4,
-                flash: Some(flash.clone()),
                 radio: Some(Parameters::FACTORY),
                 layout: LAYOUT,
-                corner,
+                chip: sim::chip::Config {
+                    corner,
+                    ..sim::chip::Config::holding(flash.clone())
+                },
                 ..Config::default()
             };
             Board::new(image(), config).expect("the image fits")

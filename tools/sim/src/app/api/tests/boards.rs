@@ -150,12 +150,13 @@ fn address_in_force_is_the_switch_at_power_on() {
 
 #[test]
 fn configured_module_is_the_stored_one() {
-    let flash = board::MODIO_02.flash_with(&[(register_map::configuration::module_of(5), 2)]);
-    let mut bench = bench_of(Config {
+    let stored = [(register_map::configuration::module_of(5), 2)];
+    let mut config = Config {
         module: Module::Relay2,
-        flash,
         ..Config::default()
-    });
+    };
+    config.chip.flash = board::MODIO_02.flash_with(&stored);
+    let mut bench = bench_of(config);
     let state = state(&mut bench);
     assert_eq!(
         (&state["module"], &state["configured"]),
