@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use modbus_frames::adu::Framing;
 
 use super::unit::{BAUD, COMMAND, KEY, Unit};
-use super::{ENDS, Running, endless_loop, get, post, refused, state};
+use super::{ENDS, Running, endless_loop, eventually, get, post, refused, state};
 
 /// The module of the modio-02's only port.
 const MODULE: [u8; 5] = [3, 0x01, 0x14, 0, 1];
@@ -113,7 +113,9 @@ fn fixed_line_keeps_its_rate_when_the_unit_changes_its_own() {
     unit.write(BAUD, 192);
     unit.save();
     unit.write(COMMAND, 2);
-    std::thread::sleep(Duration::from_millis(500));
+    eventually("the unit does not start at another rate", || {
+        state(&unit.http)["log_tail"].to_string().contains("19200")
+    });
     assert_eq!(unit.rate(), 9600);
     unit.line
         .set_read_timeout(Some(Duration::from_millis(300)))
