@@ -1,11 +1,11 @@
 //! The communication watchdog: its accuracy, the safe value of each point, the frames that restart it, and its end.
 
-use register_map::configuration::{COMM_TIMEOUT, HOLD, SAFE};
+use register_map::configuration::{COMM_TIMEOUT, FRAME_GAP, HOLD, MODE, SAFE};
 use sim::{Channel, Module, Time};
 
 use crate::{
     analog_outputs::codes,
-    bench::{Bench, FIRST, SLOT, adu},
+    bench::{Bench, FIRST, SLOT, adu, ascii},
 };
 
 const TRIPPED: u16 = 1;
@@ -268,4 +268,47 @@ fn watchdog_trips_without_any_request_since_power_on() {
     bench.board.run_for(Time::from_ms(400));
     assert_eq!(outputs(&bench), [false, true, false, false], "SAFE");
     assert!(bench.status(TRIPPED));
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn watchdog_counts_from_the_end_of_an_ascii_request() {
+    let settings = [(MODE, 1), (FRAME_GAP, 500), (COMM_TIMEOUT, 2)];
+    let mut bench = Bench::set_up(Module::Do4, &settings);
+    bench.patience = Time::from_ms(60);
+    let on = [0x05, 0, FIRST, 0xFF, 0];
+    assert_eq!(
+        bench.exchange(&ascii(&on, "\r\n")),
+        ascii(&on, "\r\n"),
+        "after 50 ms"
+    );
+    for (ms, is_on) in [(197, true), (203, false)] {
+        bench.board.run_until(bench.sent + Time::from_ms(ms));
+        assert_eq!(bench.board.channel(1), Channel::Do { on: is_on }, "{ms} ms");
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn outputs_go_to_safe_in_listen_only_mode() {
+    let mut bench = Bench::new(Module::Do4, 1);
+    bench.unlock();
+    bench.write(0x0104, &[2]).unwrap();
+    bench.ask(1, &[0x05, 0, FIRST, 0xFF, 0]).expect("a reply");
+    assert_eq!(bench.ask(1, &[0x08, 0, 4, 0, 0]), None);
+    assert_eq!(bench.board.channel(1), Channel::Do { on: true });
+    for _ in 0..10 {
+        assert_eq!(bench.ask(1, &[0x05, 0, FIRST + 1, 0xFF, 0]), None);
+        bench.board.run_for(Time::from_ms(30));
+    }
+    assert_eq!(bench.board.channel(1), Channel::Do { on: false });
+    assert_eq!(bench.board.channel(2), Channel::Do { on: false });
+    assert_eq!(
+        bench.ask(1, &[0x08, 0, 1, 0, 0]),
+        None,
+        "the restart gets no reply"
+    );
+    // The status is: communication lost, not saved, unlocked.
+    assert_eq!(bench.ask(1, &[0x07]), Some(vec![0x07, 0b10_1001]));
+    bench.assert_sound();
 }

@@ -7,9 +7,9 @@ use register_map::{
 use sim::radio::{Parameters, timing};
 use sim::{Board, Bus, Config, Corner, Module, Time};
 
-use super::SET_UP;
 use crate::LAYOUT;
 use crate::bench::{MODULE, adu, flash_with_settings, image};
+use crate::radio::SET_UP;
 
 /// The rates of LORA_AIR_RATE in bit/s.
 const RATES: [u32; 6] = [300, 1200, 2400, 4800, 9600, 19_200];
