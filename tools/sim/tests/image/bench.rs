@@ -276,7 +276,7 @@ impl Bench {
         }
         let late = self.board.now() - due;
         while self.board.driver_enable() {
-            self.board.run_for(Time::from_us(2));
+            self.board.run_for(Time::from_us(5));
         }
         let reply = self.board.line().take_received();
         let ready = reply.last().expect("a reply").end + self.ready();

@@ -56,18 +56,6 @@ fn rising_edges_are_counted_on_each_channel_after_its_debounce() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn an_input_that_is_on_at_power_on_is_not_counted() {
-    let mut bench = Bench::set_up(Module::Di4, &[]);
-    for channel in 1..=4 {
-        bench.board.set_energised(channel, true).unwrap();
-    }
-    bench.power_cycle();
-    assert_eq!(bench.bits(1, SLOT, 4), Ok(vec![true; 4]));
-    assert_eq!(counts(&mut bench), [0; 4]);
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
 fn counters_survive_a_restart_but_neither_another_module_nor_a_power_cycle() {
     let mut bench = Bench::set_up(Module::Di4, &[]);
     bench.tolerant = true;

@@ -169,7 +169,7 @@ fn rs485_line_at_921600_loses_nothing_while_the_radio_is_busy() {
     let request = adu(&echo[..201]);
     let echo = adu(&echo);
     let (mut replies, mut asked) = (0, false);
-    for _ in 0..600 {
+    for _ in 0..400 {
         if !asked {
             let now = bench.board.now();
             bench.air().send(now, &request);
@@ -187,7 +187,7 @@ fn rs485_line_at_921600_loses_nothing_while_the_radio_is_busy() {
             (replies, asked) = (replies + 1, false);
         }
     }
-    assert!(replies >= 3, "{replies} replies over the air");
+    assert!(replies >= 2, "{replies} replies over the air");
     assert_eq!(bench.registers(state::BUS_ERRORS, 1), Ok(vec![0]));
     assert_eq!(bench.registers(state::OVERRUNS, 2), Ok(vec![0, 0]));
     assert_eq!(bench.registers(radio::BUS_ERRORS, 1), Ok(vec![0]));
