@@ -5,7 +5,6 @@ use std::net::TcpStream;
 
 use modbus_frames::adu::Framing;
 
-use super::record::packets;
 use super::{IN_USE, Running, connect, endless_loop, eventually, refused, state};
 
 const READ: &[u8] = &[3, 2, 0, 0, 1];
@@ -249,28 +248,6 @@ fn unit_answers_through_the_gateway() {
         "a unit in recovery mode does not answer"
     );
     assert_eq!(state(&http)["line"]["tx_frames"], 21);
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn several_units_answer_through_the_gateway_and_are_recorded() {
-    let directory = tempfile::tempdir().unwrap();
-    let path = directory.path().join("line.pcapng");
-    let units = ["--unit", "5:4do", "--unit", "7:2relay"];
-    let more = [&units[..], &["--record", path.to_str().unwrap()]].concat();
-    let (_running, gateway, _) = image(&more);
-    let mut client = Client::connect(&gateway);
-    // The module in the unit's first slot.
-    let module = [3, 0x01, 0x14, 0, 1];
-    assert_eq!(client.ask(5, &module), [3, 2, 0, 2]);
-    assert_eq!(client.ask(6, &module), [0x83, 0x0B]);
-    assert_eq!(client.ask(7, &module), [3, 2, 0, 3]);
-    eventually("the frames are not in the file", || {
-        packets(&path).len() == 5
-    });
-    let recorded: Vec<_> = packets(&path).into_iter().map(|(_, data)| data).collect();
-    let reply = Framing::Rtu.frame(0, 7, &[3, 2, 0, 3]);
-    assert!(recorded[4].ends_with(&reply), "{recorded:02X?}");
 }
 
 #[test]
