@@ -64,11 +64,6 @@ fn one_to_three_bytes_are_an_error_even_with_a_valid_crc() {
 }
 
 #[test]
-fn four_bytes_are_the_shortest_frame() {
-    assert_eq!(unit().request(&[0x07]).unwrap(), [0x07, 0x6D]);
-}
-
-#[test]
 fn a_frame_of_256_bytes_is_processed() {
     let mut unit = unit();
     let longest = [&[0x63][..], &[0x55; 252]].concat();

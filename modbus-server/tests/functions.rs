@@ -1,8 +1,13 @@
-//! The effect and the limits of each function (V1.1b3 section 6).
+//! The effect and the limits of the functions that access points (V1.1b3 section 6).
+//!
+//! Checks have an order: function 01, then quantity, byte count and value form 03, then address 02, then value range
+//! 03, then the state of the device. So each table of requests has everything wrong that a later check would find.
 
 mod common;
 
-use common::{MAX_WORD, Points, UNIT, Unit, pack, pdu, write_bits, write_words};
+use common::{
+    MAX_WORD, Points, UNIT, Unit, frame, pack, pdu, write_bits, write_then_read, write_words,
+};
 use modbus_server::line::{Framing, Receiver};
 use modbus_server::{BitsOut, DataModel, Exception, Span, Table, WordsOut};
 
@@ -11,131 +16,116 @@ fn full() -> Unit {
     Unit::new(Points::new(0x1_0000, 0x1_0000))
 }
 
-#[test]
-fn bits_are_packed_from_bit_0_and_the_padding_is_zero() {
-    for function in [0x01, 0x02] {
-        let mut unit = full();
-        unit.points.bits_of(function)[20..31].copy_from_slice(&[
-            true, false, true, true, false, false, true, true, true, true, false,
-        ]);
-        unit.points.bits_of(function)[31] = true; // not requested: must not be in the padding
-        let reply = unit.request(&pdu(function, &[20, 11])).unwrap();
-        assert_eq!(reply, [function, 2, 0b1100_1101, 0b0000_0011]);
-    }
+/// Returns a unit with ten points of each kind, of which the last two cannot be written. It is in a state in which it
+/// serves no request.
+fn busy() -> Unit {
+    let mut points = Points::new(10, 10);
+    points.read_only_from = 8;
+    points.state = Some(Exception::ServerDeviceBusy.code());
+    Unit::new(points)
+}
+
+/// A value out of range, and an address without a point.
+const BEYOND: u16 = MAX_WORD + 1;
+const NOWHERE: u16 = 0xFFFF;
+
+/// Valid requests of every function that accesses points.
+fn valid() -> [Vec<u8>; 10] {
+    [
+        pdu(0x01, &[0, 8]),
+        pdu(0x02, &[0, 8]),
+        pdu(0x03, &[0, 1]),
+        pdu(0x04, &[0, 1]),
+        pdu(0x05, &[0, 0xFF00]),
+        pdu(0x06, &[0, 1]),
+        write_bits(0, &[true; 8]),
+        write_words(0, &[1, 2]),
+        pdu(0x16, &[0, 0xFFFF, 0]),
+        write_then_read(0, 2, 4, &[1, 2, 3]),
+    ]
 }
 
 #[test]
-fn up_to_2000_bits_are_read_in_one_request() {
+fn bits_are_read_packed_from_bit_0_with_padding_of_zeros() {
     for function in [0x01, 0x02] {
         let mut unit = full();
-        unit.points
-            .bits_of(function)
-            .iter_mut()
+        let bits = unit.points.bits_of(function);
+        bits.iter_mut()
             .skip(1)
             .step_by(3)
             .for_each(|bit| *bit = true);
-        let reply = unit.request(&pdu(function, &[0, 2000])).unwrap();
-        assert_eq!(reply[..2], [function, 250]);
-        assert_eq!(reply[2..], pack(&unit.points.bits_of(function)[..2000]));
-        assert_eq!(unit.refused(&pdu(function, &[0, 2001])), 3);
-        assert_eq!(unit.refused(&pdu(function, &[0, 0xFFFF])), 3);
-        assert_eq!(unit.refused(&pdu(function, &[0, 0])), 3);
+        for (start, count) in [(20, 11), (0, 1), (0, 2000), (0xFFFF, 1)] {
+            let reply = unit.request(&pdu(function, &[start, count])).unwrap();
+            let from = usize::from(start);
+            let packed = pack(&unit.points.bits_of(function)[from..from + usize::from(count)]);
+            assert_eq!(
+                reply,
+                [&[function, packed.len() as u8], &packed[..]].concat()
+            );
+        }
     }
 }
 
 #[test]
-fn words_are_sent_high_byte_first() {
+fn words_are_read_high_byte_first() {
     for function in [0x03, 0x04] {
         let mut unit = full();
-        unit.points.words_of(function)[0x1234] = 0xABCD;
-        unit.points.words_of(function)[0x1235] = 0x0102;
-        let reply = unit.request(&pdu(function, &[0x1234, 2])).unwrap();
-        assert_eq!(reply, [function, 4, 0xAB, 0xCD, 0x01, 0x02]);
+        let words = unit.points.words_of(function);
+        (0..0x1_0000).for_each(|n| words[n] = (n * 0x0203) as u16);
+        for (start, count) in [(0x1234, 2), (0, 125), (0xFFFF, 1)] {
+            let reply = unit.request(&pdu(function, &[start, count])).unwrap();
+            let from = usize::from(start);
+            let words = &unit.points.words_of(function)[from..from + usize::from(count)];
+            let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_be_bytes()).collect();
+            assert_eq!(reply, [&[function, bytes.len() as u8], &bytes[..]].concat());
+        }
     }
 }
 
 #[test]
-fn up_to_125_words_are_read_in_one_request() {
-    for function in [0x03, 0x04] {
-        let mut unit = full();
-        (0..125).for_each(|n| unit.points.words_of(function)[n] = (n * 0x0203) as u16);
-        let reply = unit.request(&pdu(function, &[0, 125])).unwrap();
-        assert_eq!(reply[..2], [function, 250]);
-        let bytes = unit.points.words_of(function)[..125]
-            .iter()
-            .flat_map(|word| word.to_be_bytes());
-        assert!(reply[2..].iter().copied().eq(bytes));
-        assert_eq!(unit.refused(&pdu(function, &[0, 126])), 3);
-        assert_eq!(unit.refused(&pdu(function, &[0, 0xFFFF])), 3);
-        assert_eq!(unit.refused(&pdu(function, &[0, 0])), 3);
-    }
-}
-
-#[test]
-fn the_last_address_can_be_used_and_nothing_wraps() {
+fn single_writes_are_executed_and_echoed() {
     let mut unit = full();
-    for function in 0x01..=0x04 {
-        assert!(unit.request(&pdu(function, &[0xFFFF, 1])).unwrap()[0] == function);
-        assert_eq!(unit.refused(&pdu(function, &[0xFFFF, 2])), 2);
+    for address in [172, 0xFFFF] {
+        for (value, on) in [(0xFF00, true), (0, false)] {
+            let request = pdu(0x05, &[address, value]);
+            assert_eq!(unit.request(&request).unwrap(), request);
+            assert_eq!(unit.points.bits[usize::from(address)], on);
+        }
+        let request = pdu(0x06, &[address, 0x1234]);
+        assert_eq!(unit.request(&request).unwrap(), request);
+        assert_eq!(unit.points.words[usize::from(address)], 0x1234);
     }
-    assert_eq!(
-        unit.request(&pdu(0x05, &[0xFFFF, 0xFF00])).unwrap()[0],
-        0x05
-    );
-    assert_eq!(unit.request(&pdu(0x06, &[0xFFFF, 7])).unwrap()[0], 0x06);
-    assert_eq!(
-        (unit.points.bits[0xFFFF], unit.points.words[0xFFFF]),
-        (true, 7)
-    );
-    assert_eq!(
-        unit.request(&write_bits(0xFFFF, &[false])).unwrap()[0],
-        0x0F
-    );
-    assert_eq!(unit.request(&write_words(0xFFFF, &[8])).unwrap()[0], 0x10);
-    assert_eq!(
-        (unit.points.bits[0xFFFF], unit.points.words[0xFFFF]),
-        (false, 8)
-    );
-    assert_eq!(unit.refused(&write_bits(0xFFFF, &[true, true])), 2);
-    assert_eq!(unit.refused(&write_words(0xFFFF, &[1, 1])), 2);
-}
-
-#[test]
-fn a_single_bit_accepts_only_ff00_and_0000() {
-    let mut unit = full();
-    let on = pdu(0x05, &[172, 0xFF00]);
-    assert_eq!(unit.request(&on).unwrap(), on);
-    assert!(unit.points.bits[172]);
-    for value in [0x0001, 0x1234, 0xFF01, 0x00FF, 0xFFFF, 0x0100] {
-        assert_eq!(unit.refused(&pdu(0x05, &[172, value])), 3, "{value:04X}");
-    }
-    let off = pdu(0x05, &[172, 0x0000]);
-    assert_eq!(unit.request(&off).unwrap(), off);
-    assert!(!unit.points.bits[172]);
     assert!(
         unit.points.bits.iter().all(|bit| !bit),
         "no other bit changes"
     );
+    let written = unit.points.words.iter().filter(|word| **word != 0).count();
+    assert_eq!(written, 2, "no other word changes");
 }
 
 #[test]
-fn a_single_word_is_written_and_echoed() {
+fn several_points_are_written_up_to_1968_bits_and_123_words() {
     let mut unit = full();
-    let write = pdu(0x06, &[1, 0x1234]);
-    assert_eq!(unit.request(&write).unwrap(), write);
-    assert_eq!(unit.points.words[..3], [0, 0x1234, 0]);
-    assert_eq!(unit.refused(&pdu(0x06, &[1, MAX_WORD + 1])), 3);
-}
-
-#[test]
-fn multiple_bits_are_written_and_padding_is_ignored() {
-    let mut unit = full();
+    for (start, count) in [(5, 1968), (0xFFFF, 1)] {
+        let bits: Vec<bool> = (0..count).map(|n| n % 7 < 3).collect();
+        let reply = unit.request(&write_bits(start, &bits));
+        assert_eq!(reply, Some(pdu(0x0F, &[start, count])));
+        assert_eq!(unit.points.bits[usize::from(start)..][..bits.len()], bits);
+    }
+    for (start, count) in [(0xFF00, 123), (0xFFFF, 1)] {
+        let words: Vec<u16> = (0..count).map(|n| n * 0x0101).collect();
+        let reply = unit.request(&write_words(start, &words));
+        assert_eq!(reply, Some(pdu(0x10, &[start, count])));
+        assert_eq!(
+            unit.points.words[usize::from(start)..][..words.len()],
+            words
+        );
+    }
+    // The standard's own example (6.11): ten bits from 19 on, here with the padding set, which is ignored.
+    unit.points.bits.fill(false);
     unit.points.bits[29] = true;
-    // The standard's own example (6.11): ten bits from 19 on, here with the padding set.
-    let reply = unit
-        .request(&[0x0F, 0x00, 0x13, 0x00, 0x0A, 0x02, 0xCD, 0xFD])
+    unit.request(&[0x0F, 0x00, 0x13, 0x00, 0x0A, 0x02, 0xCD, 0xFD])
         .unwrap();
-    assert_eq!(reply, [0x0F, 0x00, 0x13, 0x00, 0x0A]);
     assert_eq!(
         unit.points.bits[18..31],
         [0, 1, 0, 1, 1, 0, 0, 1, 1, 1, 0, 1, 0].map(|bit| bit == 1)
@@ -143,43 +133,55 @@ fn multiple_bits_are_written_and_padding_is_ignored() {
 }
 
 #[test]
-fn up_to_1968_bits_are_written_in_one_request() {
+fn the_and_mask_selects_the_bits_of_the_or_mask() {
     let mut unit = full();
-    let bits: Vec<bool> = (0..1968).map(|n| n % 7 < 3).collect();
-    let request = write_bits(5, &bits);
-    assert_eq!(request.len(), 252, "a frame of 255 bytes");
-    assert_eq!(unit.request(&request).unwrap(), pdu(0x0F, &[5, 1968]));
-    assert_eq!(unit.points.bits[5..5 + 1968], bits);
-    assert_eq!(unit.refused(&write_bits(5, &[true; 1969])), 3);
-    assert_eq!(unit.refused(&write_bits(5, &[])), 3);
+    for (now, and, or, then) in [
+        (0x0012, 0x00F2, 0x0025, 0x0017), // the standard's example
+        (0xABCD, 0xFFFF, 0xFFFF, 0xABCD),
+        (0xABCD, 0x0000, 0x1234, 0x1234),
+        (0xABCD, 0x00FF, 0x1234, 0x12CD),
+    ] {
+        unit.points.words[9] = now;
+        let request = pdu(0x16, &[9, and, or]);
+        assert_eq!(unit.request(&request), Some(request));
+        assert_eq!(unit.points.words[8..11], [0, then, 0]);
+    }
 }
 
 #[test]
-fn up_to_123_words_are_written_in_one_request() {
+fn up_to_121_words_are_written_before_up_to_125_are_read() {
     let mut unit = full();
-    let words: Vec<u16> = (0..123).map(|n| n * 0x0101).collect();
-    let request = write_words(0xFF00, &words);
-    assert_eq!(request.len(), 252, "a frame of 255 bytes");
-    assert_eq!(unit.request(&request).unwrap(), pdu(0x10, &[0xFF00, 123]));
-    assert_eq!(unit.points.words[0xFF00..0xFF00 + 123], words);
-    assert_eq!(unit.refused(&write_words(5, &[])), 3);
+    let words: Vec<u16> = (0..121).map(|n| n * 3).collect();
+    let reply = unit.request(&write_then_read(0xFF00, 125, 0xFF04, &words));
+    let data = [&[0; 4][..], &words].concat();
+    let bytes: Vec<u8> = data.iter().flat_map(|word| word.to_be_bytes()).collect();
+    assert_eq!(reply, Some([&[0x17, 250], &bytes[..]].concat()));
+    assert_eq!(unit.points.words[0xFF04..0xFF04 + 121], words);
 }
 
 #[test]
-fn a_124th_word_is_rejected() {
-    // Complete, it would need a frame of 257 bytes. A truncated request that fits a frame is rejected, too.
-    let mut unit = full();
-    let mut request = write_words(0, &[1; 124]);
-    assert_eq!(request[5], 248);
-    request.truncate(253);
-    assert_eq!(unit.refused(&request), 3);
-    request.truncate(6);
-    assert_eq!(unit.refused(&request), 3);
-}
-
-#[test]
-fn a_byte_count_must_match_the_quantity() {
-    let mut unit = full();
+fn requests_with_a_wrong_form_are_03_before_any_other_check() {
+    let coil = |value| pdu(0x05, &[NOWHERE, value]);
+    let mut wrong: Vec<Vec<u8>> = [0x0001, 0x1234, 0xFF01, 0x00FF, 0xFFFF, 0x0100]
+        .map(coil)
+        .to_vec();
+    for (function, most) in [(1, 2000), (2, 2000), (3, 125), (4, 125)] {
+        wrong.extend([0, most + 1, 0xFFFF].map(|count| pdu(function, &[NOWHERE, count])));
+    }
+    wrong.extend([write_bits(NOWHERE, &[]), write_bits(NOWHERE, &[true; 1969])]);
+    wrong.push(write_words(NOWHERE, &[]));
+    for (read, words) in [(0, 1), (126, 1), (1, 0)] {
+        wrong.push(write_then_read(
+            NOWHERE,
+            read,
+            NOWHERE,
+            &vec![BEYOND; words],
+        ));
+    }
+    // One word more than fits a frame, truncated to what fits.
+    wrong.push(write_words(0, &[1; 124])[..253].to_vec());
+    wrong.push(write_then_read(0, 1, 0, &[1; 122])[..253].to_vec());
+    // A byte count that is not that of the quantity, with and without as many bytes.
     for (count, data) in [
         (0, 0),
         (1, 1),
@@ -191,38 +193,145 @@ fn a_byte_count_must_match_the_quantity() {
         (255, 247),
     ] {
         for (function, quantity) in [(0x0F, 10), (0x10, 1)] {
-            let mut request = pdu(function, &[0, quantity]);
-            request.push(count);
-            request.extend(vec![0x55; data]);
-            assert_eq!(unit.refused(&request), 3, "{function:02X} {count} {data}");
+            let head = [&pdu(function, &[NOWHERE, quantity])[..], &[count]].concat();
+            wrong.push([head, vec![0x55; data]].concat());
+        }
+    }
+    for count in (0..=255).filter(|count| *count != 6) {
+        let mut both = write_then_read(NOWHERE, 2, NOWHERE, &[1, 2, 3]);
+        both[9] = count;
+        wrong.push(both);
+    }
+    for request in valid() {
+        wrong.extend((1..request.len()).map(|len| request[..len].to_vec()));
+        wrong.extend([0x00, 0xFF].map(|extra| [&request[..], &[extra]].concat()));
+    }
+    for request in wrong {
+        assert_eq!(busy().refused(&request), 3, "{request:02X?}");
+    }
+}
+
+#[test]
+fn ranges_that_reach_a_point_which_does_not_exist_or_cannot_be_written_are_02() {
+    for request in [
+        pdu(0x01, &[9, 2]),
+        pdu(0x02, &[10, 1]),
+        pdu(0x03, &[9, 2]),
+        pdu(0x04, &[NOWHERE, 2]),
+        pdu(0x05, &[8, 0xFF00]),
+        pdu(0x05, &[10, 0xFF00]),
+        pdu(0x06, &[8, BEYOND]),
+        pdu(0x06, &[10, BEYOND]),
+        write_bits(0, &[true; 9]),
+        write_bits(NOWHERE, &[true; 2]),
+        write_words(7, &[BEYOND, 0]),
+        write_words(NOWHERE, &[BEYOND; 2]),
+        pdu(0x16, &[8, 0, BEYOND]),
+        pdu(0x16, &[10, 0, BEYOND]),
+        write_then_read(9, 2, 0, &[BEYOND]),
+        write_then_read(NOWHERE, 2, 0, &[BEYOND]),
+        write_then_read(0, 1, 7, &[BEYOND, 2]),
+        write_then_read(0, 1, NOWHERE, &[BEYOND, 2]),
+    ] {
+        assert_eq!(busy().refused(&request), 2, "{request:02X?}");
+    }
+    // No range wraps, even where there is a point at every address.
+    for function in 0x01..=0x04 {
+        assert_eq!(full().refused(&pdu(function, &[0xFFFF, 2])), 2);
+    }
+    assert_eq!(full().refused(&write_bits(0xFFFF, &[true; 2])), 2);
+    assert_eq!(full().refused(&write_words(0xFFFF, &[1; 2])), 2);
+}
+
+#[test]
+fn values_out_of_range_are_03_before_the_state_is_checked() {
+    for request in [
+        pdu(0x06, &[7, BEYOND]),
+        write_words(6, &[1, BEYOND]),
+        write_then_read(0, 1, 7, &[BEYOND]),
+    ] {
+        assert_eq!(busy().refused(&request), 3, "{request:02X?}");
+    }
+    // A value that cannot be read cannot be masked.
+    let mask = pdu(0x16, &[7, 0, BEYOND]);
+    let mut unit = busy();
+    assert_eq!(unit.refused(&mask), 6);
+    unit.points.state = None;
+    assert_eq!(unit.refused(&mask), 3);
+}
+
+#[test]
+fn a_state_of_the_device_refuses_valid_requests() {
+    for state in [
+        Exception::ServerDeviceFailure,
+        Exception::ServerDeviceBusy,
+        Exception::MemoryParityError,
+        Exception::GatewayTargetDeviceFailedToRespond,
+    ] {
+        let mut unit = busy();
+        unit.points.state = Some(state.code());
+        for request in valid() {
+            assert_eq!(unit.refused(&request), state.code());
         }
     }
 }
 
 #[test]
-fn a_pdu_one_byte_too_short_or_long_is_rejected() {
-    let mut unit = full();
-    let requests = [
-        pdu(0x01, &[0, 8]),
-        pdu(0x02, &[0, 8]),
-        pdu(0x03, &[0, 1]),
-        pdu(0x04, &[0, 1]),
-        pdu(0x05, &[0, 0xFF00]),
-        pdu(0x06, &[0, 1]),
-        write_bits(0, &[true; 9]),
-        write_words(0, &[1, 2]),
+fn every_unknown_function_returns_01_with_any_data() {
+    let known = [
+        1, 2, 3, 4, 5, 6, 7, 8, 0x0B, 0x0C, 0x0F, 0x10, 0x11, 0x16, 0x17, 0x2B,
     ];
-    for request in requests {
-        // Every shorter PDU, down to only the function code.
-        for len in 1..request.len() {
-            assert_eq!(unit.refused(&request[..len]), 3, "{:02X?}", &request[..len]);
+    let mut unit = busy();
+    for function in (0x01..=0x7F).filter(|code| !known.contains(code)) {
+        for rest in [&[][..], &[0], &[0, 0, 0, 1], &[0xFF; 252]] {
+            let request = [&[function][..], rest].concat();
+            assert_eq!(unit.refused(&request), 1, "{function:02X}");
         }
-        for extra in [0x00, 0xFF] {
-            let long = [request.as_slice(), &[extra]].concat();
-            assert_eq!(unit.refused(&long), 3, "{long:02X?}");
-        }
-        assert_eq!(unit.request(&request).unwrap()[0], request[0]);
     }
+}
+
+#[test]
+fn an_invalid_function_code_gets_silence() {
+    let mut unit = full();
+    for function in (0x80..=0xFF).chain([0x00]) {
+        let reply = unit.request(&pdu(function, &[0, 1]));
+        assert_eq!(reply, None, "{function:02X}");
+    }
+    assert_eq!(unit.counters().exceptions, 0);
+    assert_eq!(unit.counters().no_response, 129);
+}
+
+#[test]
+fn a_broadcast_write_is_executed_in_silence_and_any_other_has_no_effect() {
+    let mut unit = full();
+    for request in [
+        pdu(0x05, &[3, 0xFF00]),
+        pdu(0x06, &[1, 0x0111]),
+        write_bits(4, &[true, false, true]),
+        write_words(2, &[0x0222, 0x0333]),
+        pdu(0x16, &[1, 0xFFF0, 0x0007]),
+    ] {
+        assert_eq!(unit.raw(&frame(0, &request)), None);
+    }
+    assert_eq!(unit.points.bits[3..8], [true, true, false, true, false]);
+    assert_eq!(unit.points.words[..5], [0, 0x0117, 0x0222, 0x0333, 0]);
+    unit.points.read_only_from = 8;
+    let points = unit.points.clone();
+    for request in [
+        pdu(0x01, &[0, 1]),
+        pdu(0x03, &[0, 0]),
+        pdu(0x05, &[0, 0x1234]),
+        pdu(0x06, &[8, 1]),
+        write_words(7, &[1, 1]),
+        write_then_read(0, 1, 4, &[9]),
+        vec![0x7F],
+        vec![0x00],
+        vec![0x83, 0x02],
+    ] {
+        assert_eq!(unit.raw(&frame(0, &request)), None, "{request:02X?}");
+        assert_eq!(unit.points, points, "{request:02X?}");
+    }
+    unit.must_answer();
 }
 
 #[test]

@@ -30,9 +30,12 @@ const TARGET_PACKAGES: &str = "firmware board-support modio-drivers modbus-serve
 /// The workspaces of this project.
 const WORKSPACES: [&str; 3] = ["Cargo.toml", fuzz::MANIFEST, peers::MANIFEST];
 
-/// The tests of the modio-08 that run at the corners: those of the board itself, its start and its store. The other
-/// tests run the same code as on the modio-02, and would double the time.
-const OWN_OF_08: &str = "analog:: boot:: digital:: faults_of_slots:: power_cut:: slots::";
+/// The tests of the images that run at the corners: those whose result depends on the clocks, on the time of
+/// instructions and of the flash, or on the converter.
+const AT_CORNERS: &str = "air::requests:: analog_inputs:: boot:: clock:: comm_watchdog:: counters:: dac_faults:: \
+    flash_faults:: hung_task:: in_force:: noise:: outputs_at_start:: points:: power_cut:: pulses:: saving:: \
+    silences:: timing:: upsets::a_reply";
+const AT_CORNERS_08: &str = "analog:: boot:: power_cut:: saving:: timing::";
 
 /// Which command runs a step when no step is named.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -296,8 +299,8 @@ fn sim_fast(workspace: &mut Workspace) -> Result<()> {
 
 fn sim_at(workspace: &mut Workspace, corner: &str) -> Result<()> {
     let corner = [(CORNER, corner)];
-    simulated(workspace, "--test=image", "", &corner)?;
-    simulated(workspace, "--test=image_08", OWN_OF_08, &corner)
+    simulated(workspace, "--test=image", AT_CORNERS, &corner)?;
+    simulated(workspace, "--test=image_08", AT_CORNERS_08, &corner)
 }
 
 /// Runs tests that run the images in the simulator, as an ordinary user: those of these targets whose names contain one

@@ -4,6 +4,7 @@ extern crate std;
 
 mod module;
 mod origin;
+mod ranges;
 mod saves;
 
 use std::vec::Vec;
@@ -253,7 +254,6 @@ fn settings_take_effect_immediately_or_after_the_restart() {
     assert_eq!(all(&restarted), all(&config));
 }
 
-/// Returns FILTER in force of the first point, or `None` while the settings by point are not in force.
 #[test]
 fn unsaved_is_reported_while_settings_differ_from_the_saved_ones() {
     let mut config = unlocked(&[]);

@@ -1,4 +1,5 @@
-//! Runs the whole suite on the firmware's image in the simulator, with every module.
+//! Runs the suite on the firmware's image in the simulator: every case on some boards, and the cases about points with
+//! every module.
 
 #![cfg(feature = "sim")]
 
@@ -22,7 +23,6 @@ use conformance::run::{Options, Outcome, Verdict, run};
 use modbus_line::LineFormat;
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 use register_map::board::{MODIO_02, MODIO_08};
-use register_map::points::Kind;
 use register_map::{Board, Module, configuration};
 
 /// The image of a board.
@@ -45,10 +45,9 @@ fn modio_02(module: Module) -> Fitting {
 }
 
 /// A modio-08 with these modules in its slots, port 1 first.
-fn modio_08(modules: [Module; 4], mode: Mode) -> Fitting {
+fn modio_08(modules: [Module; 4]) -> Fitting {
     Fitting {
         slots: (1..).zip(modules).collect(),
-        mode,
         ..Fitting::new(elf(&MODIO_08), &MODIO_08)
     }
 }
@@ -95,9 +94,9 @@ fn passed(outcomes: &[Outcome]) -> usize {
     passed.count()
 }
 
-/// Runs every case in process. No case may fail, and more than `least` have to pass.
-fn conforms(fitting: &Fitting, least: usize) {
-    assert_conforms(&in_process(fitting, &all()), &format!("{fitting:?}"), least);
+/// Runs these cases in process. No case may fail, and more than `least` have to pass.
+fn conforms(fitting: &Fitting, cases: &[Case], least: usize) {
+    assert_conforms(&in_process(fitting, cases), &format!("{fitting:?}"), least);
 }
 
 fn assert_conforms(outcomes: &[Outcome], unit: &str, least: usize) {
@@ -157,37 +156,18 @@ fn named(beginnings: &[&str]) -> Vec<Case> {
     cases
 }
 
-/// Runs these cases in process and through the exact line. Both must give the same verdicts, and no case may fail.
-fn conforms_on_an_exact_line(module: Module, cases: &[Case], least: usize) {
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_4do_conforms_in_process_and_with_the_same_verdicts_on_an_exact_line() {
     let verdicts = |outcomes: Vec<Outcome>| -> Vec<(&str, Verdict)> {
         let each = outcomes.into_iter();
         each.map(|outcome| (outcome.case.name, outcome.verdict))
             .collect()
     };
-    let in_process = in_process(&modio_02(module), cases);
-    assert_conforms(&in_process, module.name(), least);
-    let exact_line = Simulator::start(module).outcomes(cases);
-    assert_eq!(verdicts(exact_line), verdicts(in_process), "{module}");
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn a_4do_conforms_in_process_and_on_an_exact_line() {
-    conforms_on_an_exact_line(Module::Do4, &all(), 200);
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn cases_about_the_module_pass_on_an_exact_line_with_every_module() {
-    let cases = named(&[
-        "fc02/same-as-01",
-        "fc04/same-as-03",
-        "files/self-description",
-        "outputs/inputs-take-no-writes",
-    ]);
-    for module in Module::ALL.into_iter().filter(|m| *m != Module::Do4) {
-        conforms_on_an_exact_line(module, &cases, 1);
-    }
+    let in_process = in_process(&modio_02(Module::Do4), &all());
+    assert_conforms(&in_process, "4do", 200);
+    let exact_line = Simulator::start(Module::Do4).outcomes(&all());
+    assert_eq!(verdicts(exact_line), verdicts(in_process));
 }
 
 #[test]
@@ -203,53 +183,56 @@ fn two_runs_on_an_exact_line_give_the_same_report_to_the_byte() {
     assert_eq!(report(), first);
 }
 
+/// The beginnings of the names of cases that depend on the points of the board.
+const OF_POINTS: [&str; 14] = [
+    "fc01/",
+    "fc02/",
+    "fc03/",
+    "fc04/",
+    "fc05/",
+    "fc06/",
+    "fc0f/",
+    "fc10/",
+    "fc16/",
+    "fc17/",
+    "files/",
+    "outputs/",
+    "config/",
+    "hurts/torn-values",
+];
+
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn a_modio_02_conforms_with_every_module() {
-    Module::ALL.into_par_iter().for_each(|module| {
-        let has_outputs = module.points().contains(&Kind::BitOutput);
-        conforms(&modio_02(module), if has_outputs { 200 } else { 180 });
-    });
+    let cases = named(&OF_POINTS);
+    Module::ALL
+        .into_par_iter()
+        .for_each(|module| conforms(&modio_02(module), &cases, 40));
 }
 
 macro_rules! boards_conform {
-    ($($test:ident: $fitting:expr, $least:literal;)+) => {
+    ($($test:ident: $fitting:expr, $cases:expr, $least:literal;)+) => {
         $(#[test]
         #[ignore = "needs the image: cargo xtask test"]
         fn $test() {
-            conforms(&$fitting, $least);
+            conforms(&$fitting, &$cases, $least);
         })+
     };
 }
 
-// Each board, and a number: more cases than that have to pass.
+// Each board, the cases, and a number: more cases than that have to pass. The matrix has the other rates and formats,
+// and `cargo xtask matrix` runs every case with every module.
 boards_conform! {
     with_parity_a_strict_t15_and_another_address_it_conforms: Fitting {
         dip: 247,
         line: line(19_200, "8E1"),
         settings: vec![(configuration::STRICT_T15, 1)],
         ..modio_02(Module::Do4)
-    }, 200;
-    at_9600_without_parity_it_conforms: Fitting {
-        line: line(9600, "8N1"),
-        ..modio_02(Module::Do4)
-    }, 200;
-    at_115200_without_parity_it_conforms: Fitting {
-        dip: 9,
-        line: line(115_200, "8N1"),
-        ..modio_02(Module::Ao4)
-    }, 180;
-    in_ascii_it_conforms: Fitting { mode: Mode::Ascii, ..modio_02(Module::Do4) }, 150;
-    in_ascii_with_seven_data_bits_and_even_parity_it_conforms: Fitting {
-        line: line(19_200, "7E1"),
-        mode: Mode::Ascii,
-        ..modio_02(Module::Relay2)
-    }, 150;
+    }, all(), 200;
+    in_ascii_it_conforms: Fitting { mode: Mode::Ascii, ..modio_02(Module::Do4) }, all(), 150;
     a_modio_08_with_four_different_modules_conforms:
-        modio_08([Module::Di4, Module::Do4, Module::Ai4, Module::Ao4], Mode::Rtu), 200;
+        modio_08([Module::Di4, Module::Do4, Module::Ai4, Module::Ao4]), all(), 200;
     a_modio_08_with_empty_slots_between_modules_conforms:
-        modio_08([Module::None, Module::Relay2, Module::None, Module::Ai2Ao2], Mode::Rtu), 200;
-    a_modio_08_with_sixteen_analog_outputs_conforms: modio_08([Module::Ao4; 4], Mode::Rtu), 180;
-    a_modio_08_conforms_in_ascii:
-        modio_08([Module::Do4, Module::Do4, Module::Di4, Module::Di4], Mode::Ascii), 150;
+        modio_08([Module::None, Module::Relay2, Module::None, Module::Ai2Ao2]), named(&OF_POINTS), 40;
+    a_modio_08_with_sixteen_analog_outputs_conforms: modio_08([Module::Ao4; 4]), named(&OF_POINTS), 40;
 }

@@ -1,4 +1,5 @@
-//! Tests of every command on each kind of line, except `monitor` and `sniff`, which have their own files.
+//! Tests of every command, except `monitor` and `sniff`, which have their own files. Reads, writes and scans run on each
+//! kind of line, the other commands on one of them.
 
 use crate::program::{At, modioctl};
 use crate::unit::Unit;
@@ -15,29 +16,27 @@ fn lines(unit: &Unit) -> [At; 3] {
 
 #[test]
 #[ignore = "needs the simulator: cargo xtask test"]
-fn a_slot_is_commissioned_with_one_command_and_its_points_are_read_on_every_line() {
-    for n in 0..3 {
-        let unit = Unit::start(1, "4ai");
-        let at = &lines(&unit)[n];
-        let text = at.run("module set p5 4ai").fine();
-        assert_eq!(text, "port 5: 4ai, saved and in force; state: good\n");
-        at.run("write p5.1.range=0 p5.1.scale=1").fine();
-        at.run("config save").fine();
-        unit.post("/api/channels/1", r#"{"millivolts":1650}"#);
-        unit.wait(500);
-        let text = at.run("read p5.1").fine();
-        assert!(
-            text.starts_with("p5.1  5") && text.ends_with(" mV\n") || text.starts_with("p5.1  49"),
-            "{text}"
-        );
-        let text = at.run("reboot").fine();
-        assert!(text.starts_with("restarted"), "{text}");
-        let text = at.run("read p5.1.scale p5.2.scale").fine();
-        assert!(
-            text.contains("engineering units") && text.contains("raw 12-bit"),
-            "{text}"
-        );
-    }
+fn a_slot_is_commissioned_with_one_command_and_its_points_are_read() {
+    let unit = Unit::start(1, "4ai");
+    let [at, ..] = lines(&unit);
+    let text = at.run("module set p5 4ai").fine();
+    assert_eq!(text, "port 5: 4ai, saved and in force; state: good\n");
+    at.run("write p5.1.range=0 p5.1.scale=1").fine();
+    at.run("config save").fine();
+    unit.post("/api/channels/1", r#"{"millivolts":1650}"#);
+    unit.wait(500);
+    let text = at.run("read p5.1").fine();
+    assert!(
+        text.starts_with("p5.1  5") && text.ends_with(" mV\n") || text.starts_with("p5.1  49"),
+        "{text}"
+    );
+    let text = at.run("reboot").fine();
+    assert!(text.starts_with("restarted"), "{text}");
+    let text = at.run("read p5.1.scale p5.2.scale").fine();
+    assert!(
+        text.contains("engineering units") && text.contains("raw 12-bit"),
+        "{text}"
+    );
 }
 
 #[test]
@@ -62,35 +61,34 @@ fn outputs_are_written_and_read_back_on_every_line() {
 #[ignore = "needs the simulator: cargo xtask test"]
 fn info_and_describe_show_identity_and_registers() {
     let unit = Unit::with(7, &["--module", "2relay"]);
-    for at in lines(&unit) {
-        let text = at.run("--unit 7 info").fine();
-        for part in [
-            "LLD-ModbusIO-02",
-            "modio-02",
-            "2relay",
-            "reset cause",
-            "bus messages",
-        ] {
-            assert!(text.contains(part), "{part}: {text}");
-        }
-        let info: serde_json::Value =
-            serde_json::from_str(&at.run("--unit 7 --json info").fine()).unwrap();
-        assert_eq!(info["unit address"], 7);
-        let text = at.run("--unit 7 describe").fine();
-        for part in ["p5.3 ", "digital output", "BAUD", "COMM_TIMEOUT", "0x0010"] {
-            assert!(text.contains(part), "{part}: {text}");
-        }
-        // The description read from the unit is the same, except for the source.
-        let read = at.run("--unit 7 describe --refresh").fine();
-        assert!(
-            read.lines().next().unwrap().ends_with("from the unit"),
-            "{read}"
-        );
-        assert!(
-            read.lines().skip(1).eq(text.lines().skip(1)),
-            "{read}\n{text}"
-        );
+    let [_, at, _] = lines(&unit);
+    let text = at.run("--unit 7 info").fine();
+    for part in [
+        "LLD-ModbusIO-02",
+        "modio-02",
+        "2relay",
+        "reset cause",
+        "bus messages",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
     }
+    let info: serde_json::Value =
+        serde_json::from_str(&at.run("--unit 7 --json info").fine()).unwrap();
+    assert_eq!(info["unit address"], 7);
+    let text = at.run("--unit 7 describe").fine();
+    for part in ["p5.3 ", "digital output", "BAUD", "COMM_TIMEOUT", "0x0010"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    // The description read from the unit is the same, except for the source.
+    let read = at.run("--unit 7 describe --refresh").fine();
+    assert!(
+        read.lines().next().unwrap().ends_with("from the unit"),
+        "{read}"
+    );
+    assert!(
+        read.lines().skip(1).eq(text.lines().skip(1)),
+        "{read}\n{text}"
+    );
 }
 
 #[test]
@@ -100,45 +98,44 @@ fn settings_are_exported_and_imported_and_a_wrong_file_changes_nothing() {
     let directory = tempfile::tempdir().unwrap();
     let file = directory.path().join("unit.toml");
     let path = file.display();
-    for at in lines(&unit) {
-        at.run("config reset --restart").fine();
-        at.run("module set 5 2ai2ao").fine();
-        let wrote = at.run(&format!("config export {path} --force"));
-        assert_eq!(wrote.err, format!("modioctl: wrote {path}\n"));
-        assert_eq!(wrote.fine(), "");
-        let same = at.run(&format!("config diff {path}")).fine();
-        assert_eq!(same, "no difference\n");
+    let [.., at] = lines(&unit);
+    at.run("config reset --restart").fine();
+    at.run("module set 5 2ai2ao").fine();
+    let wrote = at.run(&format!("config export {path} --force"));
+    assert_eq!(wrote.err, format!("modioctl: wrote {path}\n"));
+    assert_eq!(wrote.fine(), "");
+    let same = at.run(&format!("config diff {path}")).fine();
+    assert_eq!(same, "no difference\n");
 
-        let exported = std::fs::read_to_string(&file).unwrap();
-        let changed = exported
-            .replace("COMM_TIMEOUT = 0.0", "COMM_TIMEOUT = 2.5")
-            .replace("p5.3.safe = 0 ", "p5.3.safe = 1000 ");
-        std::fs::write(&file, changed.replace("p5.1.beta = 3950", "p5.1.beta = 10")).unwrap();
-        let wrong = at.run(&format!("config import {path}")).failed(2);
-        assert!(
-            wrong.contains("p5.1.beta") && wrong.contains("2000 to 5000 K"),
-            "{wrong}"
-        );
-        assert_eq!(at.run("read COMM_TIMEOUT").fine(), "COMM_TIMEOUT  0.0 s\n");
+    let exported = std::fs::read_to_string(&file).unwrap();
+    let changed = exported
+        .replace("COMM_TIMEOUT = 0.0", "COMM_TIMEOUT = 2.5")
+        .replace("p5.3.safe = 0 ", "p5.3.safe = 1000 ");
+    std::fs::write(&file, changed.replace("p5.1.beta = 3950", "p5.1.beta = 10")).unwrap();
+    let wrong = at.run(&format!("config import {path}")).failed(2);
+    assert!(
+        wrong.contains("p5.1.beta") && wrong.contains("2000 to 5000 K"),
+        "{wrong}"
+    );
+    assert_eq!(at.run("read COMM_TIMEOUT").fine(), "COMM_TIMEOUT  0.0 s\n");
 
-        std::fs::write(&file, changed).unwrap();
-        let differs = at.run(&format!("config diff {path}")).fine();
-        assert!(
-            differs.contains("COMM_TIMEOUT") && differs.contains("p5.3.safe"),
-            "{differs}"
-        );
-        let text = at.run(&format!("config import {path} --restart")).fine();
-        let rows = [
-            "COMM_TIMEOUT  0.0 s     2.5 s\n",
-            "p5.3.safe     0         1000\n",
-        ];
-        assert!(rows.iter().all(|row| text.contains(row)), "{text}");
-        assert!(text.ends_with("\n2 settings written\nsaved\n"), "{text}");
-        assert_eq!(
-            at.run("config get COMM_TIMEOUT").fine(),
-            "COMM_TIMEOUT  2.5 s\n"
-        );
-    }
+    std::fs::write(&file, changed).unwrap();
+    let differs = at.run(&format!("config diff {path}")).fine();
+    assert!(
+        differs.contains("COMM_TIMEOUT") && differs.contains("p5.3.safe"),
+        "{differs}"
+    );
+    let text = at.run(&format!("config import {path} --restart")).fine();
+    let rows = [
+        "COMM_TIMEOUT  0.0 s     2.5 s\n",
+        "p5.3.safe     0         1000\n",
+    ];
+    assert!(rows.iter().all(|row| text.contains(row)), "{text}");
+    assert!(text.ends_with("\n2 settings written\nsaved\n"), "{text}");
+    assert_eq!(
+        at.run("config get COMM_TIMEOUT").fine(),
+        "COMM_TIMEOUT  2.5 s\n"
+    );
 }
 
 #[test]
@@ -166,31 +163,30 @@ fn an_import_with_another_rate_follows_the_unit() {
 #[ignore = "needs the simulator: cargo xtask test"]
 fn watch_prints_values_and_waits_for_a_lost_unit() {
     let unit = Unit::with(1, &["--module", "4di"]);
-    for at in lines(&unit) {
-        let text = at.run("watch --count 3 --every 50ms").fine();
-        assert_eq!(text.matches("p5.4 off").count(), 3, "{text}");
-        let text = at
-            .run("watch p5.1 status --count 2 --every 50ms --csv")
-            .fine();
-        assert_eq!(text.lines().next(), Some("time,p5.1,status"));
-        assert_eq!(text.matches(",off,-").count(), 2, "{text}");
-        let mut watching =
-            at.start("--timeout 600ms --retries 0 watch p5.1 --count 40 --every 50ms --json-lines");
-        watching.out.wait_for("p5.1");
-        unit.post("/api/power", r#"{"on":false}"#);
-        watching.err.wait_for("waiting for it");
-        unit.post("/api/power", r#"{"on":true}"#);
-        watching.err.wait_for("is back");
-        let ran = watching.end();
-        assert_eq!(ran.status, 0, "{ran:?}");
-        let lines = ran.out;
-        let values: Vec<serde_json::Value> = lines
-            .lines()
-            .map(|line| serde_json::from_str(line).unwrap())
-            .collect();
-        assert_eq!(values.len(), 40);
-        assert!(values.iter().all(|value| value["p5.1"] == false), "{lines}");
-    }
+    let [at, ..] = lines(&unit);
+    let text = at.run("watch --count 3 --every 50ms").fine();
+    assert_eq!(text.matches("p5.4 off").count(), 3, "{text}");
+    let text = at
+        .run("watch p5.1 status --count 2 --every 50ms --csv")
+        .fine();
+    assert_eq!(text.lines().next(), Some("time,p5.1,status"));
+    assert_eq!(text.matches(",off,-").count(), 2, "{text}");
+    let mut watching =
+        at.start("--timeout 600ms --retries 0 watch p5.1 --count 40 --every 50ms --json-lines");
+    watching.out.wait_for("p5.1");
+    unit.post("/api/power", r#"{"on":false}"#);
+    watching.err.wait_for("waiting for it");
+    unit.post("/api/power", r#"{"on":true}"#);
+    watching.err.wait_for("is back");
+    let ran = watching.end();
+    assert_eq!(ran.status, 0, "{ran:?}");
+    let lines = ran.out;
+    let values: Vec<serde_json::Value> = lines
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    assert_eq!(values.len(), 40);
+    assert!(values.iter().all(|value| value["p5.1"] == false), "{lines}");
 }
 
 #[test]
@@ -214,7 +210,7 @@ fn a_raw_pdu_is_sent_and_both_frames_are_shown() {
 
 #[test]
 #[ignore = "needs the simulator: cargo xtask test"]
-fn a_unit_is_found_blinks_and_is_exported_on_every_line() {
+fn a_unit_is_found_on_every_line_blinks_and_is_exported() {
     let unit = Unit::with(2, &["--module", "2relay"]);
     for at in lines(&unit) {
         let found = at.run("--timeout 600ms --json scan --units 1-3").fine();
@@ -222,21 +218,21 @@ fn a_unit_is_found_blinks_and_is_exported_on_every_line() {
         let units = found["units"].as_array().unwrap();
         assert_eq!(units.len(), 1, "{found}");
         assert_eq!(units[0]["unit"], 2, "{found}");
-
-        at.run("--unit 2 identify").fine();
-        let csv = at.run("--unit 2 export csv").fine();
-        assert!(csv.contains("p5.3,"), "{csv}");
-        let json = at.run("--unit 2 export json").fine();
-        let json: serde_json::Value = serde_json::from_str(&json).unwrap();
-        assert!(json.is_object());
-        for (system, output) in [
-            ("home-assistant", "p5.3"),
-            ("telegraf", "p5_3"),
-            ("node-red", "p5.3"),
-        ] {
-            let made = at.run(&format!("--unit 2 export {system}")).fine();
-            assert!(made.contains(output), "{system}: {made}");
-        }
+    }
+    let [at, ..] = lines(&unit);
+    at.run("--unit 2 identify").fine();
+    let csv = at.run("--unit 2 export csv").fine();
+    assert!(csv.contains("p5.3,"), "{csv}");
+    let json = at.run("--unit 2 export json").fine();
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert!(json.is_object());
+    for (system, output) in [
+        ("home-assistant", "p5.3"),
+        ("telegraf", "p5_3"),
+        ("node-red", "p5.3"),
+    ] {
+        let made = at.run(&format!("--unit 2 export {system}")).fine();
+        assert!(made.contains(output), "{system}: {made}");
     }
 }
 

@@ -76,9 +76,15 @@ fn writing_does_not_wait_for_a_master_that_does_not_read() {
     let (events, _queue) = mpsc::channel();
     let pty = Pty::open(None, events, Event::Bytes).unwrap();
     let _master = open(pty.path().unwrap());
-    for _ in 0..1000 {
-        pty.write(&[0x55; 256]);
-    }
+    let (done, is_done) = mpsc::channel();
+    thread::spawn(move || {
+        for _ in 0..1000 {
+            pty.write(&[0x55; 256]);
+        }
+        done.send(())
+    });
+    let ended = is_done.recv_timeout(Duration::from_secs(20));
+    assert!(ended.is_ok(), "a write waits for the master");
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-use super::{Running, connect, refused, state};
+use super::{Running, connect, eventually, refused, state};
 
 /// A client of the line.
 struct Client {
@@ -202,16 +202,23 @@ fn a_client_that_disconnects_in_the_middle_is_replaced_by_the_next() {
 #[cfg(unix)]
 #[test]
 fn signals_end_the_simulator_during_a_long_request() {
-    let (mut running, line, _) = started(&[]);
+    let (mut running, line, http) = started(&[]);
     let mut client = Client::connect(&line);
+    let before = state(&http)["virtual_ms"].take();
     client
         .stream
         .get_mut()
         .write_all(b"run 600000000\n")
         .unwrap();
-    std::thread::sleep(Duration::from_millis(50));
+    eventually("no virtual time passes", || {
+        state(&http)["virtual_ms"] != before
+    });
     running.signal("-INT");
     assert_eq!(running.end(), (Some(0), String::new()));
+    // The connection may end with an error.
+    let mut reply = String::new();
+    let _ = client.stream.read_line(&mut reply);
+    assert_eq!(reply, "", "the request was not over");
 }
 
 #[test]

@@ -2,12 +2,10 @@
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::TcpStream;
-use std::time::{Duration, Instant};
 
 use modbus_line::adu::Framing;
 
-use super::record::packets;
-use super::{IN_USE, Running, connect, endless_loop, refused, state};
+use super::{IN_USE, Running, connect, endless_loop, eventually, refused, state};
 
 const READ: &[u8] = &[3, 2, 0, 0, 1];
 
@@ -192,10 +190,9 @@ fn halted_core_is_exception_0a_until_the_debugger_leaves() {
     let mut client = Client::connect(&gateway);
     assert_eq!(client.ask(1, READ), [0x83, 0x0A]);
     drop(debugger);
-    let limit = Instant::now() + Duration::from_secs(60);
-    while client.ask(1, READ) != [0x83, 0x0B] {
-        assert!(Instant::now() < limit, "the core is still halted");
-    }
+    eventually("the core is still halted", || {
+        client.ask(1, READ) == [0x83, 0x0B]
+    });
 }
 
 #[test]
@@ -255,30 +252,6 @@ fn unit_answers_through_the_gateway() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn several_units_answer_through_the_gateway_and_are_recorded() {
-    let directory = tempfile::tempdir().unwrap();
-    let path = directory.path().join("line.pcapng");
-    let units = ["--unit", "5:4do", "--unit", "7:2relay"];
-    let more = [&units[..], &["--record", path.to_str().unwrap()]].concat();
-    let (_running, gateway, _) = image(&more);
-    let mut client = Client::connect(&gateway);
-    // The module in the unit's first slot.
-    let module = [3, 0x01, 0x14, 0, 1];
-    assert_eq!(client.ask(5, &module), [3, 2, 0, 2]);
-    assert_eq!(client.ask(6, &module), [0x83, 0x0B]);
-    assert_eq!(client.ask(7, &module), [3, 2, 0, 3]);
-    let limit = Instant::now() + Duration::from_secs(60);
-    while packets(&path).len() < 5 {
-        assert!(Instant::now() < limit, "the frames are not in the file");
-    }
-    let recorded: Vec<_> = packets(&path).into_iter().map(|(_, data)| data).collect();
-    let reply = Framing::Rtu.frame(0, 7, &[3, 2, 0, 3]);
-    assert!(recorded[4].ends_with(&reply), "{recorded:02X?}");
-    assert_eq!(recorded.len(), 5);
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
 fn gateway_follows_the_unit_to_ascii_mode_and_another_rate() {
     let (_running, gateway, http) = image(&[]);
     let mut client = Client::connect(&gateway);
@@ -293,8 +266,8 @@ fn gateway_follows_the_unit_to_ascii_mode_and_another_rate() {
         let pdu = write(address, value);
         assert_eq!(client.ask(1, &pdu), pdu, "{address:#06x}");
     }
-    // The unit answers first, then restarts.
-    std::thread::sleep(Duration::from_millis(500));
-    assert_eq!(client.ask(1, &[3, 1, 3, 0, 1]), [3, 2, 0, 1]);
-    assert_eq!(state(&http)["line"]["baud"], 38_400);
+    // The unit answers first, then restarts, and does not answer while it starts.
+    eventually("no answer in ASCII mode", || {
+        client.ask(1, &[3, 1, 3, 0, 1]) == [3, 2, 0, 1] && state(&http)["line"]["baud"] == 38_400
+    });
 }

@@ -4,12 +4,11 @@ use std::fs;
 use std::io::Write;
 use std::net::TcpStream;
 use std::path::Path;
-use std::time::{Duration, Instant};
 
 use modbus_line::adu::Framing;
 use pcap_file::pcapng::{Block, PcapNgReader};
 
-use super::{ENDS, Running};
+use super::{ENDS, Running, eventually};
 
 /// Returns time in ns and data of each packet in a file, which must be complete.
 pub fn packets(path: &Path) -> Vec<(u128, Vec<u8>)> {
@@ -38,14 +37,9 @@ fn capture_file_is_readable_while_the_simulator_runs_and_complete_at_its_end() {
         let frame = Framing::Rtu.frame(0, 1, &[3, 0, 0, 0, 1]);
         for count in 1..=3 {
             line.write_all(&frame).unwrap();
-            let limit = Instant::now() + Duration::from_secs(60);
-            while packets(&path).len() < count {
-                assert!(
-                    Instant::now() < limit,
-                    "{signal}: the frame is not in the file"
-                );
-                std::thread::sleep(Duration::from_millis(2));
-            }
+            eventually("the frame is not in the file", || {
+                packets(&path).len() == count
+            });
         }
         running.signal(signal);
         assert_eq!(running.end().0, *status, "{signal}");
@@ -66,11 +60,9 @@ fn recording_of_the_exact_line_has_the_instants_of_virtual_time() {
         let mut line = TcpStream::connect(running.endpoint("exact-line: ")).unwrap();
         line.write_all(b"hello 1\nrun 1000\nsend 01 07 41 E2\nrun 2000000\n")
             .unwrap();
-        let limit = Instant::now() + Duration::from_secs(60);
-        while packets(&path).is_empty() {
-            assert!(Instant::now() < limit, "the frame is not in the file");
-            std::thread::sleep(Duration::from_millis(2));
-        }
+        eventually("the frame is not in the file", || {
+            !packets(&path).is_empty()
+        });
         let (signal, status) = ENDS[0];
         running.signal(signal);
         assert_eq!(running.end().0, status);

@@ -146,11 +146,9 @@ impl Running {
 
     /// Waits for the end. Returns the exit status and the text on stderr.
     pub fn end(&mut self) -> (Option<i32>, String) {
-        let limit = Instant::now() + Duration::from_secs(60);
-        while self.child.try_wait().unwrap().is_none() {
-            assert!(Instant::now() < limit, "the simulator does not end");
-            std::thread::sleep(Duration::from_millis(5));
-        }
+        eventually("the simulator does not end", || {
+            self.child.try_wait().unwrap().is_some()
+        });
         let mut said = String::new();
         self.child
             .stderr
@@ -167,6 +165,15 @@ impl Drop for Running {
         // The simulator has already ended unless the test has failed.
         let _ = self.child.kill();
         let _ = self.child.wait();
+    }
+}
+
+/// Waits until `is` returns true, which may take a minute.
+pub fn eventually(what: &str, mut is: impl FnMut() -> bool) {
+    let end = Instant::now() + Duration::from_secs(60);
+    while !is() {
+        assert!(Instant::now() < end, "{what}");
+        std::thread::sleep(Duration::from_millis(5));
     }
 }
 

@@ -3,10 +3,8 @@
 use std::fs;
 use std::time::{Duration, Instant};
 
-use modbus_line::adu::Framing;
-
 use super::unit::{BAUD, COMMAND, KEY, Unit};
-use super::{ENDS, Running, endless_loop, get, post, refused, state};
+use super::{ENDS, Running, endless_loop, eventually, get, post, refused, state};
 
 /// The module of the modio-02's only port.
 const MODULE: [u8; 5] = [3, 0x01, 0x14, 0, 1];
@@ -42,24 +40,6 @@ fn units_answer_the_first_request_after_their_endpoints_were_announced() {
         let mut unit = Unit::start(options);
         let reply = unit.try_unit(address, &MODULE, 4);
         assert!(reply.is_some(), "unit {address} with {options:?}");
-    }
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn replies_of_two_units_with_the_same_address_collide() {
-    let mut unit = Unit::start(&["--unit", "5:4do", "--unit", "5:4di"]);
-    let begin = Instant::now();
-    loop {
-        let reply = unit.try_unit(5, &MODULE, 4);
-        let whole = reply.as_ref().and_then(|reply| Framing::Rtu.open(reply));
-        assert!(whole.is_none(), "4do has code 2, 4di has 1: {reply:02X?}");
-        let frames = get(&unit.http, "/api/frames");
-        let frames = frames["frames"].as_array().unwrap();
-        if frames.iter().any(|frame| frame["damaged"] == true) {
-            break;
-        }
-        assert!(begin.elapsed() < Duration::from_secs(60), "{frames:?}");
     }
 }
 
@@ -113,7 +93,9 @@ fn fixed_line_keeps_its_rate_when_the_unit_changes_its_own() {
     unit.write(BAUD, 192);
     unit.save();
     unit.write(COMMAND, 2);
-    std::thread::sleep(Duration::from_millis(500));
+    eventually("the unit does not start at another rate", || {
+        state(&unit.http)["log_tail"].to_string().contains("19200")
+    });
     assert_eq!(unit.rate(), 9600);
     unit.line
         .set_read_timeout(Some(Duration::from_millis(300)))

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use modbus_line::adu::Framing;
 
-use super::{ENDS, Running, state};
+use super::{ENDS, Running, eventually, state};
 
 /// KEY, which opens the configuration's lock with 0x5A17.
 pub const KEY: u16 = 0x0100;
@@ -164,7 +164,6 @@ fn the_line_follows_the_unit_to_another_rate() {
     );
     unit.write(COMMAND, 2);
     // The unit answers first, then restarts.
-    std::thread::sleep(Duration::from_millis(300));
+    eventually("the line does not follow", || unit.rate() == 115_200);
     assert_eq!(unit.read(BAUD), 1152);
-    assert_eq!(unit.rate(), 115_200);
 }

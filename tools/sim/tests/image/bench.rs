@@ -116,6 +116,16 @@ pub fn adu(bytes: &[u8]) -> Vec<u8> {
     [bytes, &crc(bytes)].concat()
 }
 
+/// Returns an ASCII frame of unit 1.
+pub fn ascii(pdu: &[u8], end: &str) -> Vec<u8> {
+    let sum = pdu.iter().fold(1u8, |sum, byte| sum.wrapping_add(*byte));
+    let mut text = String::from(":01");
+    for byte in pdu.iter().chain(&[sum.wrapping_neg()]) {
+        text += &format!("{byte:02X}");
+    }
+    (text + end).into_bytes()
+}
+
 /// Returns the line's format for a value of FORMAT.
 pub fn format(code: u16) -> Format {
     Format::ALL[usize::from(code)]
@@ -263,7 +273,7 @@ impl Bench {
         }
         let late = self.board.now() - due;
         while self.board.driver_enable() {
-            self.board.run_for(Time::from_us(2));
+            self.board.run_for(Time::from_us(5));
         }
         let reply = self.board.line().take_received();
         let ready = reply.last().expect("a reply").end + self.ready();

@@ -1,7 +1,7 @@
 //! Several boards on one line.
 
-use sim::line::{Direction, Frame, Received};
-use sim::{Board, Bus, Channel, Config, Module, Time};
+use sim::line::Received;
+use sim::{Board, Bus, Config, Module, Time};
 
 use crate::LAYOUT;
 use crate::bench::{FIRST, adu, corner, flash_with, image};
@@ -15,17 +15,13 @@ fn bus(dips: impl IntoIterator<Item = u8>) -> Bus {
 }
 
 fn board(dip: u8) -> Board {
-    board_with(dip, Module::Di4)
-}
-
-fn board_with(dip: u8, module: Module) -> Board {
     let config = Config {
         dip,
-        module,
+        module: Module::Di4,
         layout: LAYOUT,
         chip: sim::chip::Config {
             corner: corner(),
-            ..sim::chip::Config::holding(flash_with(module))
+            ..sim::chip::Config::holding(flash_with(Module::Di4))
         },
         ..Config::default()
     };
@@ -53,102 +49,6 @@ fn ask(bus: &mut Bus, unit: u8, pdu: &[u8]) -> Option<Vec<u8>> {
 
 fn read_inputs(bus: &mut Bus, unit: u8) -> Option<Vec<u8>> {
     ask(bus, unit, &[2, 0, FIRST, 0, 4])
-}
-
-/// Returns a counter of function 08.
-fn counter(bus: &mut Bus, unit: u8, which: u8) -> u16 {
-    match ask(bus, unit, &[8, 0, which, 0, 0]).as_deref() {
-        Some(&[8, 0, echo, high, low]) if echo == which => u16::from_be_bytes([high, low]),
-        reply => panic!("a counter: {reply:02X?}"),
-    }
-}
-
-fn assert_sound(bus: &Bus) {
-    for board in bus.boards() {
-        assert_eq!(board.findings(), []);
-        assert_eq!(board.resets(), 0);
-    }
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn each_unit_answers_only_when_it_is_asked() {
-    let mut bus = bus([1, 2]);
-    bus.board_mut(1).set_energised(1, true).unwrap();
-    bus.run_for(Time::from_ms(100));
-    for _ in 0..3 {
-        assert_eq!(read_inputs(&mut bus, 1).as_deref(), Some(&[2, 1, 0][..]));
-        assert_eq!(read_inputs(&mut bus, 2).as_deref(), Some(&[2, 1, 1][..]));
-        assert_eq!(read_inputs(&mut bus, 3), None);
-    }
-    assert_eq!(bus.line().collisions().count(), 0);
-    let frames: Vec<Frame> = bus.line().frames().cloned().collect();
-    assert_eq!(frames.len(), 15);
-    assert!(frames.iter().all(|frame| frame.crc_ok && !frame.damaged));
-    let answers = |unit: &&Frame| unit.direction == Direction::FromUnit;
-    assert_eq!(frames.iter().filter(answers).count(), 6);
-    assert_sound(&bus);
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn units_in_listen_only_mode_count_every_message_and_no_error() {
-    let mut bus = bus([1, 2, 3]);
-    for _ in 0..40 {
-        assert!(read_inputs(&mut bus, 1).is_some());
-    }
-    for unit in [2, 3] {
-        // The earlier messages and this request.
-        let frames = bus.line().frames().count() as u16;
-        assert_eq!(counter(&mut bus, unit, 0x0B), frames + 1);
-        assert_eq!(counter(&mut bus, unit, 0x0C), 0);
-    }
-    assert_sound(&bus);
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn replies_of_two_units_with_the_same_address_collide() {
-    let run = || {
-        let mut bus = bus([1, 1]);
-        bus.board_mut(1).set_energised(1, true).unwrap();
-        bus.run_for(Time::from_ms(100));
-        let received = exchange(&mut bus, &adu(&[1, 2, 0, FIRST, 0, 4]));
-        let line = bus.line();
-        let frames: Vec<Frame> = line.frames().cloned().collect();
-        (received, frames, line.collisions().collect::<Vec<_>>())
-    };
-    let (received, frames, collisions) = run();
-    assert!(received.iter().all(|received| received.collided));
-    // The replies differ in the inputs and in the CRC. A bit that both units send as high is high.
-    let (one, other) = (adu(&[1, 2, 1, 0]), adu(&[1, 2, 1, 1]));
-    let wired: Vec<u8> = one.iter().zip(&other).map(|(a, b)| a & b).collect();
-    let bytes: Vec<u8> = received.iter().map(|received| received.byte).collect();
-    assert_eq!(bytes, wired);
-    assert_ne!(bytes, one);
-    assert_eq!(frames.len(), 2);
-    assert!(frames[1].damaged && !frames[1].crc_ok);
-    // Both drivers are on from the first start bit to the end of the last stop bit.
-    let [collision] = collisions[..] else {
-        panic!("not one collision: {collisions:?}");
-    };
-    assert!(
-        collision.start <= frames[1].start && frames[1].end <= collision.end + Time::from_us(1)
-    );
-    assert_eq!(run(), (received, frames, collisions));
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn a_broadcast_acts_on_all_units() {
-    let boards = [1, 2, 3].map(|dip| board_with(dip, Module::Do4));
-    let mut bus = Bus::new(boards.into());
-    bus.run_for(Time::from_ms(150));
-    assert_eq!(exchange(&mut bus, &adu(&[0, 5, 0, FIRST, 0xFF, 0])), []);
-    for board in bus.boards() {
-        assert_eq!(board.channel(1), Channel::Do { on: true });
-    }
-    assert_sound(&bus);
 }
 
 #[test]

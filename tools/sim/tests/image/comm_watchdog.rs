@@ -1,11 +1,11 @@
 //! The communication watchdog: its accuracy, the safe value of each point, the frames that restart it, and its end.
 
-use register_map::configuration::{COMM_TIMEOUT, HOLD, SAFE};
+use register_map::configuration::{COMM_TIMEOUT, FRAME_GAP, HOLD, MODE, SAFE};
 use sim::{Channel, Module, Time};
 
 use crate::{
     analog_outputs::codes,
-    bench::{Bench, FIRST, SLOT, adu},
+    bench::{Bench, FIRST, SLOT, adu, ascii},
 };
 
 const TRIPPED: u16 = 1;
@@ -106,52 +106,6 @@ fn analog_outputs_go_to_safe_two_milliseconds_around_the_time_out() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn each_point_goes_to_its_safe_value_or_keeps_its_value() {
-    let mut bench = Bench::set_up(Module::Do4, &[]);
-    for (safe, commanded, then) in [
-        (
-            [1, 0, HOLD, HOLD],
-            [false, true, true, false],
-            [true, false, true, false],
-        ),
-        (
-            [HOLD, HOLD, 1, 0],
-            [true, false, false, true],
-            [true, false, true, false],
-        ),
-        ([1; 4], [false; 4], [true; 4]),
-        ([HOLD; 4], [true; 4], [true; 4]),
-    ] {
-        bench.configure(SAFE + SLOT, &safe);
-        armed(&mut bench, 1);
-        bench.write_bits(SLOT, &commanded).unwrap();
-        bench.board.run_for(Time::from_ms(150));
-        assert_eq!(outputs(&bench), then, "{safe:?}");
-        assert_eq!(bench.bits(1, SLOT, 4), Ok(then.to_vec()), "the bits read");
-    }
-
-    let stored = [
-        (SAFE + SLOT + 2, 1),
-        (SAFE + SLOT + 3, HOLD),
-        (COMM_TIMEOUT, 1),
-    ];
-    let mut bench = Bench::set_up(Module::Relay2, &stored);
-    bench.write_bits(SLOT + 2, &[false, true]).unwrap();
-    bench.board.run_for(Time::from_ms(150));
-    for relay in [1, 2] {
-        let energised = matches!(
-            bench.board.channel(relay),
-            Channel::Relay {
-                energised: true,
-                ..
-            }
-        );
-        assert!(energised, "relay {relay}");
-    }
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
 fn only_requests_and_broadcasts_restart_the_watchdog() {
     let mut bench = Bench::set_up(Module::Do4, &[]);
     // A pause of 60 ms, and 15 to 25 ms for the frame and its reply, always stay below 100 ms.
@@ -202,45 +156,6 @@ fn only_requests_and_broadcasts_restart_the_watchdog() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn outputs_stay_safe_until_they_are_written_and_the_flag_until_it_is_cleared() {
-    let mut bench = Bench::set_up(Module::Do4, &[(SAFE + SLOT + 2, 1)]);
-    bench.tolerant = true;
-    armed(&mut bench, 1);
-    assert!(!bench.status(TRIPPED));
-    bench.board.run_for(Time::from_ms(300));
-    let safe = [false, false, true, false];
-    assert_eq!(outputs(&bench), safe);
-
-    // The master is back: reads and refused writes change no output.
-    for _ in 0..20 {
-        assert_eq!(bench.bits(1, SLOT, 4), Ok(safe.to_vec()));
-        assert_eq!(bench.write_single(5, SLOT, 0x0100), Err(3));
-        assert_eq!(bench.write_bits(SLOT + 2, &[true; 3]), Err(2));
-        assert!(bench.status(TRIPPED), "the flag stays set");
-    }
-    assert_eq!(outputs(&bench), safe);
-    bench.write_bit(SLOT, true).unwrap();
-    assert_eq!(
-        outputs(&bench),
-        [true, false, true, false],
-        "only the written output"
-    );
-    assert!(bench.status(TRIPPED), "a write does not clear the flag");
-    bench.command(5);
-    assert!(!bench.status(TRIPPED));
-    assert_eq!(outputs(&bench), [true, false, true, false]);
-
-    // The watchdog trips again. A restart clears the flag, too.
-    bench.board.run_for(Time::from_ms(300));
-    assert_eq!(outputs(&bench), safe);
-    assert!(bench.status(TRIPPED));
-    bench.restart();
-    assert!(!bench.status(TRIPPED), "COMM_TIMEOUT was not saved");
-    assert_eq!(outputs(&bench), [false; 4]);
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
 fn time_out_of_zero_never_trips_and_a_new_time_out_is_in_force_immediately() {
     let mut bench = Bench::set_up(Module::Do4, &[]);
     armed(&mut bench, 0);
@@ -268,4 +183,47 @@ fn watchdog_trips_without_any_request_since_power_on() {
     bench.board.run_for(Time::from_ms(400));
     assert_eq!(outputs(&bench), [false, true, false, false], "SAFE");
     assert!(bench.status(TRIPPED));
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn watchdog_counts_from_the_end_of_an_ascii_request() {
+    let settings = [(MODE, 1), (FRAME_GAP, 500), (COMM_TIMEOUT, 2)];
+    let mut bench = Bench::set_up(Module::Do4, &settings);
+    bench.patience = Time::from_ms(60);
+    let on = [0x05, 0, FIRST, 0xFF, 0];
+    assert_eq!(
+        bench.exchange(&ascii(&on, "\r\n")),
+        ascii(&on, "\r\n"),
+        "after 50 ms"
+    );
+    for (ms, is_on) in [(197, true), (203, false)] {
+        bench.board.run_until(bench.sent + Time::from_ms(ms));
+        assert_eq!(bench.board.channel(1), Channel::Do { on: is_on }, "{ms} ms");
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn outputs_go_to_safe_in_listen_only_mode() {
+    let mut bench = Bench::new(Module::Do4, 1);
+    bench.unlock();
+    bench.write(0x0104, &[2]).unwrap();
+    bench.ask(1, &[0x05, 0, FIRST, 0xFF, 0]).expect("a reply");
+    assert_eq!(bench.ask(1, &[0x08, 0, 4, 0, 0]), None);
+    assert_eq!(bench.board.channel(1), Channel::Do { on: true });
+    for _ in 0..10 {
+        assert_eq!(bench.ask(1, &[0x05, 0, FIRST + 1, 0xFF, 0]), None);
+        bench.board.run_for(Time::from_ms(30));
+    }
+    assert_eq!(bench.board.channel(1), Channel::Do { on: false });
+    assert_eq!(bench.board.channel(2), Channel::Do { on: false });
+    assert_eq!(
+        bench.ask(1, &[0x08, 0, 1, 0, 0]),
+        None,
+        "the restart gets no reply"
+    );
+    // The status is: communication lost, not saved, unlocked.
+    assert_eq!(bench.ask(1, &[0x07]), Some(vec![0x07, 0b10_1001]));
+    bench.assert_sound();
 }

@@ -1,5 +1,6 @@
 //! The DIP switch SW01.
 
+use sim::line::{Format, Settings};
 use sim::{Config, Module, Time};
 
 use crate::bench::{Bench, FIRST, flash_with};
@@ -21,15 +22,6 @@ fn a_unit_answers_only_to_its_own_address() {
         assert!(!bench.board.leds().fault);
         bench.assert_answers(dip);
     }
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn with_all_positions_on_it_is_unit_255_at_9600_8n2() {
-    let mut bench = Bench::new(Module::Di4, 255);
-    bench.assert_answers(255);
-    assert_eq!(bench.ask(1, &[1, 0, FIRST, 0, 4]), None);
-    assert!(!bench.board.leds().fault);
 }
 
 #[test]
@@ -137,4 +129,33 @@ fn reset_of_any_kind_keeps_the_address_of_power_on() {
     bench.board.cycle();
     bench.started();
     bench.assert_answers(18);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn all_switches_on_selects_the_default_line_settings_with_any_stored_settings() {
+    let mut bench = Bench::set_up(Module::Di4, &[(0x0101, 9216), (0x0102, 2), (0x0105, 1000)]);
+    bench.patience = Time::from_ms(1002);
+    assert_eq!(bench.register(0x0101), 9216);
+    bench.board.set_dip(255);
+    bench.power_cycle();
+    bench.settings(Settings::default());
+    bench.patience = Time::ZERO;
+    assert!(!bench.board.leds().fault);
+    assert_eq!(bench.ask(1, &[1, 0, FIRST, 0, 4]), None);
+    let reply = bench.ask(255, &[3, 1, 1, 0, 2]).expect("the unit answers");
+    assert_eq!(reply, [3, 4, 0x24, 0, 0, 2], "the stored values are read");
+    // Correct the stored values.
+    bench.ask(255, &[6, 1, 0, 0x5A, 0x17]).unwrap();
+    bench.ask(255, &[16, 1, 1, 0, 2, 4, 0, 192, 0, 1]).unwrap();
+    bench.ask(255, &[6, 1, 8, 0, 1]).unwrap();
+    bench.board.run_for(Time::from_ms(100));
+    bench.board.set_dip(1);
+    bench.power_cycle();
+    bench.settings(Settings {
+        baud: 19_200,
+        format: Format::E1,
+    });
+    bench.patience = Time::from_ms(1002);
+    bench.assert_answers(1);
 }

@@ -50,16 +50,3 @@ fn identify_makes_all_leds_blink_for_ten_seconds() {
         "run blinks once a second"
     );
 }
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn unit_serves_requests_while_it_identifies_itself() {
-    let mut bench = Bench::set_up(Module::Di4, &[]);
-    assert_eq!(bench.write(0x0108, &[6]), Err(6), "the lock is closed");
-    bench.command(6);
-    for _ in 0..20 {
-        bench.assert_answers(1);
-    }
-    assert!([LIT, DARK].contains(&bench.board.leds()));
-    assert_eq!(bench.register(0x0108), 0);
-}

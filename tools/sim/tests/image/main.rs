@@ -1,5 +1,8 @@
 //! The release image on the virtual board: its behaviour for a master on the line and for a person at the board.
 //!
+//! What a master sees of the unit's functions, registers and frames is tested by the conformance suite, and logic by
+//! the crates' own tests on the host. The tests here are about time, power, disturbances and the circuit.
+//!
 //! The image comes from `MODIO_ELF`, which `cargo xtask test` sets after building it. It is that of the modio-02. The
 //! tests of the modio-08's image are in `tests/image_08`; they use most of the files here as well, which name the
 //! board's first slot by [`bench::PORT`], [`bench::SLOT`] and [`bench::MODULE`].
@@ -8,11 +11,11 @@
 //! |---|---|
 //! | a board and its master | `bench`, `registers` |
 //! | the description | `self_description` |
-//! | the line | `standard_functions`, `ascii`, `framing`, `noise`, `pulses`, `refusals`, `timing`, `silences`, `dip`, `bus` |
-//! | points | `points`, `functions`, `analog_inputs`, `analog_outputs`, `dac_faults`, `counters`, `identify` |
-//! | configuration | `lock`, `ranges`, `in_force`, `module_choice`, `storing`, `saving`, `save_budget`, `flash_faults`, `power_cut` |
+//! | the line | `noise`, `pulses`, `timing`, `silences`, `dip`, `bus` |
+//! | points | `points`, `analog_inputs`, `analog_outputs`, `dac_faults`, `counters`, `identify` |
+//! | configuration | `lock`, `in_force`, `module_choice`, `storing`, `saving`, `save_budget`, `flash_faults`, `power_cut` |
 //! | the simulator | `cores`: boards of one process share translated code |
-//! | the radio | `radio` |
+//! | the radio | `radio`, `air` |
 //! | safety | `boot`, `clock`, `outputs_at_start`, `comm_watchdog`, `hung_task`, `faults`, `upsets`, `kept`, `stack`, `log`, `long_run` |
 
 use sim::board::{Layout, MODIO_02};
@@ -22,9 +25,9 @@ const LAYOUT: &Layout = &MODIO_02;
 /// The variable that names the image.
 const ELF: &str = "MODIO_ELF";
 
+mod air;
 mod analog_inputs;
 mod analog_outputs;
-mod ascii;
 mod bench;
 mod boot;
 mod bus;
@@ -36,8 +39,6 @@ mod dac_faults;
 mod dip;
 mod faults;
 mod flash_faults;
-mod framing;
-mod functions;
 mod hung_task;
 mod identify;
 mod in_force;
@@ -52,15 +53,12 @@ mod points;
 mod power_cut;
 mod pulses;
 mod radio;
-mod ranges;
-mod refusals;
 mod registers;
 mod save_budget;
 mod saving;
 mod self_description;
 mod silences;
 mod stack;
-mod standard_functions;
 mod storing;
 mod timing;
 mod upsets;

@@ -27,39 +27,6 @@ const WAIT: Most = Most(Time::from_us(6), Time::from_us(11));
 /// Line settings of the soak test: BAUD, FORMAT, `STRICT_T15`.
 const LINES: [[u16; 3]; 4] = [[96, 0, 0], [192, 1, 1], [1152, 3, 0], [9216, 2, 1]];
 
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn unit_answers_after_ten_thousand_random_frames() {
-    let mut rng = Rng::with_seed(0x6D6F_6469_6F01);
-    let mut bench = Bench::new(Module::Do4, 1);
-    for number in 0..FRAMES {
-        // Most frames are short; a few have the maximum length or more.
-        let length = match rng.u8(0..20) {
-            0 => rng.usize(200..320),
-            1..=4 => rng.usize(20..60),
-            _ => rng.usize(1..20),
-        };
-        let mut frame: Vec<u8> = (0..length).map(|_| rng.u8(..)).collect();
-        // Half of the frames begin with this unit's address and a supported function code.
-        if rng.bool() {
-            frame[0] = 1;
-            if let Some(function) = frame.get_mut(1) {
-                *function = *rng.choice(&[1, 2, 3, 4, 5, 6, 15, 16]).unwrap();
-            }
-        }
-        let good = is_good(&frame);
-        let reply = bench.exchange(&frame);
-        assert!(
-            good || reply.is_empty(),
-            "frame {number} {frame:02X?} got {reply:02X?}"
-        );
-        if number % 50 == 0 {
-            bench.assert_answers(1);
-        }
-    }
-    bench.assert_answers(1);
-}
-
 /// Sends valid frames and frames damaged in every way, with the shortest allowed silence between them. The unit must
 /// answer or obey every valid frame for it, ignore frames for other units, and only count damaged frames. The exception
 /// is damage that a CRC cannot detect: the damaged frame has a valid CRC by chance.

@@ -126,26 +126,3 @@ fn analog_outputs_go_from_the_stored_dac_values_directly_to_start() {
         assert_eq!(bench.registers(SLOT, 4), Ok(start.to_vec()), "{what}");
     }
 }
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn start_values_are_used_from_the_next_start_and_only_when_saved() {
-    let mut bench = Bench::set_up(Module::Do4, &[]);
-    bench.tolerant = true;
-    bench.configure(START + SLOT, &[1, 1, 0, 1]);
-    assert_eq!(
-        bench.bits(1, SLOT, 4),
-        Ok(vec![false; 4]),
-        "START must not change an output now"
-    );
-    bench.power_cycle();
-    assert_eq!(
-        bench.bits(1, SLOT, 4),
-        Ok(vec![false; 4]),
-        "START was not saved"
-    );
-    bench.configure(START + SLOT, &[1, 1, 0, 1]);
-    bench.save();
-    bench.power_cycle();
-    assert_eq!(bench.bits(1, SLOT, 4), Ok(vec![true, true, false, true]));
-}

@@ -98,57 +98,6 @@ fn a_write_reaches_its_output_before_the_reply_is_out() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn refused_write_to_several_outputs_changes_none_of_them() {
-    let mut bench = Bench::new(Module::Do4, 1);
-    for pin in 0..4 {
-        bench.board.watch_pin('A', pin);
-    }
-    // The fifth does not exist.
-    let reply = bench.ask(1, &[0x0F, 0, FIRST, 0, 5, 1, 0x1F]);
-    assert_eq!(reply.as_deref(), Some(&[0x8F, 2][..]));
-    let reply = bench.ask(1, &[0x0F, 0, 0x0F, 0, 2, 1, 0x03]);
-    assert_eq!(reply.as_deref(), Some(&[0x8F, 2][..]));
-    for pin in 0..4 {
-        assert_eq!(bench.board.pin_edges('A', pin), []);
-    }
-    // A valid write changes all its pins together.
-    bench.ask(1, &[0x0F, 0, FIRST, 0, 4, 1, 0x0F]).unwrap();
-    let at = |pin| bench.board.pin_edges('A', pin)[0].0;
-    assert!(
-        at(3) - at(0) < Time::from_us(20),
-        "the pins change within one scan"
-    );
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn broadcast_is_executed_without_a_reply() {
-    let mut bench = Bench::new(Module::Do4, 1);
-    assert_eq!(bench.ask(0, &[5, 0, FIRST + 1, 0xFF, 0]), None);
-    assert!(on(&bench, 2));
-    assert_eq!(bench.ask(0, &[0x0F, 0, FIRST, 0, 4, 1, 0b1001]), None);
-    assert_eq!(
-        [1, 2, 3, 4].map(|c| on(&bench, c)),
-        [true, false, false, true]
-    );
-    // A read, an exception and an invalid request as broadcasts get no reply and change nothing.
-    for pdu in [
-        &[1, 0, FIRST, 0, 4][..],
-        &[5, 0, 0x20, 0xFF, 0],
-        &[0x55],
-        &[5, 0, FIRST, 0x12, 0x34],
-    ] {
-        assert_eq!(bench.ask(0, pdu), None, "{pdu:02X?}");
-    }
-    assert_eq!(
-        [1, 2, 3, 4].map(|c| on(&bench, c)),
-        [true, false, false, true]
-    );
-    bench.assert_answers(1);
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
 fn outputs_are_off_from_the_first_instant_and_after_every_power_on() {
     let mut bench = Bench::cold(sim::Config {
         module: Module::Do4,

@@ -137,53 +137,6 @@ fn erases_of_many_saves_lose_no_request() {
     assert_eq!(master.bench.registers(FILTER, 4), Ok(vec![22, 23, 20, 21]));
 }
 
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn no_request_goes_unanswered_when_pages_change_over() {
-    let mut master = Master::new(Module::Di4, &large());
-    for round in 0..3 {
-        master.write(0x0100, 0x5A17);
-        let used = |master: &Master| {
-            let flash = master.bench.board.flash();
-            pages().map(|page| flash[page].iter().filter(|b| **b != 0xFF).count())
-        };
-        let before = used(&master);
-        let mut changed_over = false;
-        for n in 0..2 {
-            master.write(FILTER, 100 * round + n);
-            let operations = master.bench.board.flash_operations();
-            master.save();
-            assert!(master.bench.board.flash_operations() > operations + 190);
-            let now = used(&master);
-            changed_over |= (0..2).any(|page| before[page] <= 2 && now[page] > 2);
-        }
-        assert!(changed_over || round == 0, "{before:?}: no change-over");
-        master.bench.power_cycle();
-        assert_eq!(master.bench.register(FILTER), 100 * round + 1);
-        assert!(!master.bench.status(2));
-    }
-    assert_eq!(master.bench.board.resets(), 0);
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn a_change_made_while_a_save_runs_is_not_part_of_it_and_another_save_is_busy() {
-    let mut bench = Master::new(Module::Di4, &large()).bench;
-    bench.configure(FILTER, &[77]);
-    bench.write(0x0108, &[1]).unwrap();
-    bench.write(FILTER, &[88]).unwrap();
-    assert_eq!(
-        bench.write(0x0108, &[1]),
-        Err(6),
-        "the last save is not complete"
-    );
-    bench.board.run_for(Time::from_ms(300));
-    assert_eq!(bench.register(FILTER), 88);
-    assert!(bench.status(UNSAVED), "the value 88 is not saved");
-    bench.power_cycle();
-    assert_eq!(bench.register(FILTER), 77);
-}
-
 /// No request is served while the background task holds the device, nor while code in RAM programs the flash, which
 /// takes the time of the flash operation.
 #[test]

@@ -81,17 +81,6 @@ impl Bench {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn file_1_describes_the_unit_with_any_number_of_groups() {
-    let mut bench = Bench::set_up(Module::Ai4, &[]);
-    let file = bench.self_description(1);
-    bench.assert_described(Known::Ai4, &file);
-    for groups in [2, 7, 35] {
-        assert_eq!(bench.self_description(groups), file, "{groups} groups");
-    }
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
 fn crc_changes_with_the_module_in_force() {
     let mut bench = Bench::set_up(Module::Di4, &[]);
     let file = bench.self_description(1);
@@ -108,52 +97,4 @@ fn crc_changes_with_the_module_in_force() {
     let file = bench.self_description(3);
     let after = bench.assert_described(Known::Ai2Ao2, &file);
     assert_ne!(before, after);
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn a_request_for_other_records_is_refused() {
-    let mut bench = Bench::set_up(Module::Di4, &[]);
-    for (groups, code) in [
-        (&[(0, 0, 1)][..], 2),
-        (&[(2, 0, 1)], 2),
-        (&[(0x100, 0, 1)], 2),
-        (&[(1, 0, 1), (2, 0, 1)], 2),
-        (&[(1, 9999, 1)], 2),
-        (&[(1, 9999, 2)], 2),
-        (&[(1, 0xFFFF, 1)], 2),
-        (&[(1, 0, 125)], 3),
-        (&[(2, 0, 125)], 3),
-        (&[(1, 0, 0)], 3),
-        (&[(1, 0, 61), (1, 0, 63)], 3),
-    ] {
-        assert_eq!(bench.read_file(groups), Err(code), "{groups:?}");
-    }
-    for (pdu, code) in [
-        // A different reference type.
-        (&[0x14, 7, 5, 0, 1, 0, 0, 0, 1][..], 2),
-        (&[0x14, 7, 7, 0, 1, 0, 0, 0, 1], 2),
-        // Byte counts that are not allowed, or that do not match the data.
-        (&[0x14], 3),
-        (&[0x14, 0], 3),
-        (&[0x14, 6, 6, 0, 1, 0, 0, 0], 3),
-        (&[0x14, 8, 6, 0, 1, 0, 0, 0, 1, 6], 3),
-        (&[0x14, 14, 6, 0, 1, 0, 0, 0, 1], 3),
-        (&[0x14, 7, 6, 0, 1, 0, 0, 0, 1, 0], 3),
-        // Writes.
-        (&[0x15, 9, 6, 0, 1, 0, 0, 0, 1, 0, 0], 2),
-        (&[0x15, 9, 6, 1, 0, 0, 0, 0, 1, 0, 0], 2),
-        (&[0x15, 9, 6, 0, 1, 0, 0, 0, 2, 0, 0], 3),
-    ] {
-        assert_eq!(bench.request(pdu), Err(code), "{pdu:02X?}");
-    }
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn functions_14_and_15_as_a_broadcast_get_no_reply() {
-    let mut bench = Bench::set_up(Module::Di4, &[]);
-    assert_eq!(bench.ask(0, &request(&[(1, 0, 2)])), None);
-    assert_eq!(bench.ask(0, &[0x15, 9, 6, 0, 1, 0, 0, 0, 1, 0, 0]), None);
-    bench.assert_answers(1);
 }

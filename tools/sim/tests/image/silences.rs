@@ -9,8 +9,7 @@ use sim::line::{Direction, Settings};
 use sim::radio::Parameters;
 use sim::{Config, Module, Time};
 
-use crate::ascii::ascii;
-use crate::bench::{Bench, MODULE, adu, flash_with_settings};
+use crate::bench::{Bench, MODULE, adu, ascii, flash_with_settings};
 use crate::saving::{SLOWEST, large};
 use crate::self_description::request;
 
@@ -126,8 +125,11 @@ impl Loaded {
 #[ignore = "needs the image: cargo xtask test"]
 fn no_reply_has_a_silence_of_more_than_half_a_character_under_any_load() {
     let mut failures = Vec::new();
-    for baud in [Baud::B1200, Baud::B19200, Baud::B115200, Baud::B921600] {
-        for is_ascii in [false, true] {
+    for (bauds, is_ascii) in [
+        (&[Baud::B1200, Baud::B115200, Baud::B921600][..], false),
+        (&[Baud::B115200, Baud::B921600], true),
+    ] {
+        for &baud in bauds {
             let mut loaded = Loaded::new(baud, is_ascii);
             let half = Time::from_ps(loaded.bench.characters(1).as_ps() / 2);
             let mut longest = requests().map(|(name, _)| (name, Some(Time::ZERO)));

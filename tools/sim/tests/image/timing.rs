@@ -3,8 +3,7 @@
 use register_map::{codes::Baud, configuration};
 use sim::{Module, Time, line::Direction};
 
-use crate::ascii::ascii;
-use crate::bench::{Bench, FIRST, Most, adu, corner};
+use crate::bench::{Bench, FIRST, Most, adu, ascii, corner};
 
 /// From t3.5 to the write of the first byte to the UART's data register. The baud generator adds up to a bit.
 const LATE: Most = Most(Time::from_us(25), Time::from_us(45));

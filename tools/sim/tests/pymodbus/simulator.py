@@ -81,29 +81,17 @@ class Simulator(modio_sim.Simulator):
 class OnSimulator(unittest.TestCase):
     """Tests that share the simulator of their class."""
 
-    DIP = 1
     MODULE = "4di"
 
     @classmethod
     def setUpClass(cls):
-        cls.simulator = Simulator.of(
-            dip=cls.DIP, module=cls.MODULE, options=["--modbus-tcp", "127.0.0.1:0"])
+        cls.simulator = Simulator.of(module=cls.MODULE, options=["--modbus-tcp", "127.0.0.1:0"])
         # Cleanups run in reverse order, so this one is the last.
         cls.addClassCleanup(cls.simulator.end_well)
 
     def setUp(self):
         self.master = self.simulator.master()
         self.addCleanup(self.master.close)
-
-    def bits(self, answer, count: int) -> list[bool]:
-        """Returns the bits of an answer, which must not be an exception."""
-        self.assertFalse(answer.isError(), answer)
-        return answer.bits[:count]
-
-    def refused(self, answer, code: int):
-        """Asserts that the answer is an exception response with this code."""
-        self.assertTrue(answer.isError(), answer)
-        self.assertEqual(answer.exception_code, code, answer)
 
     def silent(self, ask):
         """Asserts that `ask(master)` gets no answer."""
@@ -125,23 +113,6 @@ class OnSimulator(unittest.TestCase):
         while (seen := what()) != wanted and self.simulator.state().virtual_ms < end:
             time.sleep(0.005)
         self.assertEqual(seen, wanted)
-
-
-class AsciiLine:
-    """Mixin in front of a class of tests: runs the same tests in ASCII mode, at 115200 bit/s."""
-
-    @classmethod
-    def setUpClass(cls):
-        super().setUpClass()
-        master = cls.simulator.master()
-        # KEY; BAUD; MODE; COMMAND: save, restart.
-        for address, value in ((0x0100, 0x5A17), (0x0101, 1152), (0x0103, 1), (0x0108, 1), (0x0108, 2)):
-            answer = master.write_register(address, value)
-            assert not answer.isError(), answer
-        master.close()
-        cls.simulator.wait(300)
-        assert cls.simulator.state().line.baud == 115200
-        cls.simulator.framer = FramerType.ASCII
 
 
 def crc(frame: bytes) -> bytes:

@@ -1,10 +1,6 @@
-//! The radio as a second line.
+//! The radio as a second line: a unit with a module, and the set-up of the module.
 
-mod faults;
-mod requests;
 mod set_up;
-mod several;
-mod two_lines;
 
 use register_map::{configuration::LORA, state};
 use sim::radio::{Packet, Parameters, Sender};
@@ -13,14 +9,14 @@ use sim::{Config, Module, Time};
 use crate::bench::{Bench, FIRST, MODULE, adu, flash_with_settings};
 
 /// Time for the module's start and set-up: 500 ms for its own start, the rest for commands and changes of the mode.
-const SET_UP: Time = Time::from_ms(1_500);
+pub const SET_UP: Time = Time::from_ms(1_500);
 /// Time after which there is no reply any more. The longest exchange of these tests takes less at 2.4 kbit/s.
-const SILENCE: Time = Time::from_ms(6_000);
+pub const SILENCE: Time = Time::from_ms(6_000);
 /// Silence after a reply. The longest pause between two packets of these tests is shorter.
 const PAUSE: Time = Time::from_ms(700);
 
 /// A 4DI at unit address 1 with a radio module, before its set-up is complete.
-fn starting(module: Parameters, settings: &[(u16, u16)]) -> Bench {
+pub fn starting(module: Parameters, settings: &[(u16, u16)]) -> Bench {
     let all = [&[(MODULE, Module::Di4.code()), (LORA, 1)], settings].concat();
     Bench::with(Config {
         module: Module::Di4,
@@ -31,23 +27,25 @@ fn starting(module: Parameters, settings: &[(u16, u16)]) -> Bench {
 }
 
 /// The same after its set-up.
-fn bench(settings: &[(u16, u16)]) -> Bench {
+pub fn bench(settings: &[(u16, u16)]) -> Bench {
     let mut bench = starting(Parameters::FACTORY, settings);
     bench.board.run_for(SET_UP);
     bench
 }
 
 impl Bench {
-    fn module(&self) -> &sim::radio::Module {
+    /// Returns the radio module.
+    pub fn module(&self) -> &sim::radio::Module {
         self.board.radio().expect("a module is fitted")
     }
 
-    fn air(&mut self) -> &mut sim::radio::Air {
+    /// Returns the air.
+    pub fn air(&mut self) -> &mut sim::radio::Air {
         self.board.air().expect("a module is fitted")
     }
 
     /// Sends bytes over the air and returns the bytes that the gateway receives, up to a [`PAUSE`].
-    fn over_the_air(&mut self, bytes: &[u8]) -> Vec<u8> {
+    pub fn over_the_air(&mut self, bytes: &[u8]) -> Vec<u8> {
         let now = self.board.now();
         self.air().send(now, bytes);
         let end = now + SILENCE;
@@ -61,7 +59,7 @@ impl Bench {
     }
 
     /// Sends a PDU to a unit over the air and returns the PDU of the reply, whose frame it checks.
-    fn ask_over_the_air(&mut self, unit: u8, pdu: &[u8]) -> Option<Vec<u8>> {
+    pub fn ask_over_the_air(&mut self, unit: u8, pdu: &[u8]) -> Option<Vec<u8>> {
         let reply = self.over_the_air(&adu(&[&[unit], pdu].concat()));
         if reply.is_empty() {
             return None;
@@ -72,7 +70,8 @@ impl Bench {
         Some(body[1..].to_vec())
     }
 
-    fn read_over_the_air(&mut self, address: u16, count: u16) -> Vec<u16> {
+    /// Reads registers of unit 1 over the air.
+    pub fn read_over_the_air(&mut self, address: u16, count: u16) -> Vec<u16> {
         let [[a, b], [c, d]] = [address, count].map(u16::to_be_bytes);
         let reply = self.ask_over_the_air(1, &[3, a, b, c, d]).expect("a reply");
         assert_eq!(
@@ -84,7 +83,8 @@ impl Bench {
         words.iter().copied().map(u16::from_be_bytes).collect()
     }
 
-    fn write_over_the_air(&mut self, address: u16, value: u16) {
+    /// Writes a register of unit 1 over the air.
+    pub fn write_over_the_air(&mut self, address: u16, value: u16) {
         let [[a, b], [c, d]] = [address, value].map(u16::to_be_bytes);
         let request = [6, a, b, c, d];
         assert_eq!(
@@ -93,20 +93,22 @@ impl Bench {
         );
     }
 
+    /// Asserts that unit 1 answers over the air.
     #[track_caller]
-    fn assert_answers_over_the_air(&mut self) {
+    pub fn assert_answers_over_the_air(&mut self) {
         let reply = self.ask_over_the_air(1, &[1, 0, FIRST, 0, 4]);
         assert!(matches!(reply.as_deref(), Some([1, 1, _])), "{reply:02X?}");
     }
 
     /// Asserts that the firmware itself caused the last reset.
     #[track_caller]
-    fn assert_restarted(&mut self) {
+    pub fn assert_restarted(&mut self) {
         let cause = self.register(state::RESET_CAUSE);
         assert_ne!(cause & state::reset_cause::SOFTWARE, 0, "a restart");
     }
 
-    fn packets_of_the_unit(&mut self) -> Vec<Packet> {
+    /// Returns the packets that the unit has sent.
+    pub fn packets_of_the_unit(&mut self) -> Vec<Packet> {
         let air = self.air();
         let of_the_unit = air
             .packets()

@@ -4,11 +4,10 @@ use register_map::{
     configuration::{COMMAND, LORA, LORA_ADDRESS, LORA_AIR_RATE, LORA_CHANNEL, LORA_POWER},
     radio, state,
 };
-use sim::radio::{Confirmation, Mode, Parameters};
+use sim::radio::{Mode, Parameters};
 use sim::{Config, Module, Time};
 
-use super::{SET_UP, bench, starting};
-use crate::LAYOUT;
+use super::{SET_UP, bench};
 use crate::bench::{Bench, FIRST, MODULE, flash_with_settings};
 
 #[test]
@@ -34,32 +33,6 @@ fn module_gets_the_stored_settings_and_requests_over_the_air_are_answered() {
     );
     assert!(bench.board.take_log().ends_with("radio: ready\n"));
     assert!(!bench.status(state::status::MODULE_FAULT));
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn module_that_has_the_settings_already_is_not_written() {
-    let wanted = Parameters::FACTORY.with_address(7);
-    let mut bench = starting(wanted, &[(LORA_ADDRESS, 7)]);
-    let aux = LAYOUT.radio.aux;
-    let (port, number) = (aux.port(), aux.number() as u8);
-    bench.board.watch_pin(port, number);
-    bench.board.run_for(SET_UP);
-    // The end of the module's start, the command that reads the parameters, and the change to the normal mode.
-    assert_eq!(bench.board.pin_edges(port, number).len(), 1 + 2 + 2);
-    bench.assert_answers_over_the_air();
-    assert_eq!(bench.module().stored(), wanted);
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn module_whose_reply_to_the_settings_is_a_text_is_set_up() {
-    let mut bench = starting(Parameters::FACTORY, &[(LORA_CHANNEL, 3)]);
-    bench
-        .board
-        .change_radio(|module| module.set_confirmation(Confirmation::Text));
-    bench.board.run_for(SET_UP);
-    bench.assert_answers_over_the_air();
 }
 
 #[test]

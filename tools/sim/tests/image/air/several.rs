@@ -7,9 +7,9 @@ use register_map::{
 use sim::radio::{Parameters, timing};
 use sim::{Board, Bus, Config, Corner, Module, Time};
 
-use super::SET_UP;
 use crate::LAYOUT;
 use crate::bench::{MODULE, adu, flash_with_settings, image};
+use crate::radio::SET_UP;
 
 /// The rates of LORA_AIR_RATE in bit/s.
 const RATES: [u32; 6] = [300, 1200, 2400, 4800, 9600, 19_200];
@@ -94,8 +94,9 @@ impl Air {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn three_units_that_are_asked_in_turn_answer_at_once_at_every_air_rate() {
-    for corner in [Corner::Fast, Corner::Slow] {
-        for rate in RATES {
+    // The lowest rates take minutes at each corner.
+    for (corner, rates) in [(Corner::Fast, &RATES[2..]), (Corner::Slow, &RATES[..])] {
+        for &rate in rates {
             let mut air = Air::new(rate, corner);
             for (unit, count) in [(1, 1), (2, 26), (3, 2), (1, 9)] {
                 assert_eq!(air.read(unit, FILTER, count), vec![5; count.into()]);

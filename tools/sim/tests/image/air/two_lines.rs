@@ -9,8 +9,8 @@ use register_map::{
 use sim::Time;
 use sim::radio::Mode;
 
-use super::{SET_UP, bench};
 use crate::bench::{Bench, adu};
+use crate::radio::{SET_UP, bench};
 
 impl Bench {
     /// Writes COMMAND over the air, and returns at the instant at which the gateway has the reply.
@@ -19,7 +19,7 @@ impl Bench {
         let request = adu(&[1, 6, a, b, 0, command]);
         let now = self.board.now();
         self.air().send(now, &request);
-        let limit = now + super::SILENCE;
+        let limit = now + crate::radio::SILENCE;
         while self.air().received().count() < request.len() {
             assert!(self.board.now() < limit, "no reply");
             self.board.run_for(Time::from_ms(1));
