@@ -25,7 +25,7 @@ pub struct Config {
     /// Corner of the part.
     pub corner: Corner,
     /// Whether the 8 MHz crystal works. Without it HSERDY is never set. The crystal can also fail later
-    /// ([`crate::Board::set_crystal`]).
+    /// ([`crate::Chip::set_crystal`]).
     pub crystal: bool,
     /// Contents of the flash before the image is written; erased if `None`. Writing the image erases the pages that it
     /// needs.
