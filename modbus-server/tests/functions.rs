@@ -170,7 +170,7 @@ fn requests_with_a_wrong_form_are_03_before_any_other_check() {
     }
     wrong.extend([write_bits(NOWHERE, &[]), write_bits(NOWHERE, &[true; 1969])]);
     wrong.push(write_words(NOWHERE, &[]));
-    for (read, words) in [(0, 1), (126, 1), (1, 0)] {
+    for (read, words) in [(0, 2), (126, 2), (2, 0)] {
         wrong.push(write_then_read(
             NOWHERE,
             read,
