@@ -170,7 +170,7 @@ fn requests_with_a_wrong_form_are_03_before_any_other_check() {
     }
     wrong.extend([write_bits(NOWHERE, &[]), write_bits(NOWHERE, &[true; 1969])]);
     wrong.push(write_words(NOWHERE, &[]));
-    for (read, words) in [(0, 1), (126, 1), (1, 0)] {
+    for (read, words) in [(0, 2), (126, 2), (2, 0)] {
         wrong.push(write_then_read(
             NOWHERE,
             read,
@@ -181,7 +181,7 @@ fn requests_with_a_wrong_form_are_03_before_any_other_check() {
     // One word more than fits a frame, truncated to what fits.
     wrong.push(write_words(0, &[1; 124])[..253].to_vec());
     wrong.push(write_then_read(0, 1, 0, &[1; 122])[..253].to_vec());
-    // A byte count that is not that of the quantity, with and without as many bytes.
+    // A byte count that does not fit the quantity, with as many bytes and with fewer or more.
     for (count, data) in [
         (0, 0),
         (1, 1),

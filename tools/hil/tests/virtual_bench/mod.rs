@@ -1,7 +1,6 @@
-//! Boards in the simulator on one line, with wires between them.
+//! Boards in one simulator, on its line, with wires between them.
 
 mod http;
-mod line;
 
 use std::env;
 use std::fs;
@@ -18,9 +17,6 @@ use serde_json::{Value, json};
 /// Interval at which inputs are set to the values of their outputs.
 const CARRY: Duration = Duration::from_millis(20);
 
-/// Duration of each level of a contact that bounces, in ms of the board's time. The factory's debounce is 5 ms.
-const BOUNCE: f64 = 8.0;
-
 /// Highest voltage at the pin of an analog input, in mV, which gives code 4095.
 const FULL_SCALE: f64 = 3300.0;
 
@@ -35,8 +31,6 @@ pub struct Loop {
 #[derive(Clone, Copy, Debug)]
 enum Kind {
     Digital,
-    /// The input switches on twice when the output switches on.
-    Bouncing,
     /// The input is the output multiplied by this factor.
     Analog(f64),
 }
@@ -51,13 +45,6 @@ impl Loop {
         }
     }
 
-    /// From a channel of a 4DO to one of a 4DI, with a contact that bounces.
-    pub const fn bouncing(unit: u8, output: u8, other: u8, input: u8) -> Self {
-        let mut wire = Self::digital(unit, output, other, input);
-        wire.kind = Kind::Bouncing;
-        wire
-    }
-
     /// From an analog output of unit 1 to one of its analog inputs.
     pub const fn analog(output: u8, input: u8, gain: f64) -> Self {
         Self {
@@ -68,15 +55,14 @@ impl Loop {
     }
 }
 
-/// A board.
-struct Board {
-    unit: u8,
+/// The simulator with the boards.
+struct Simulator {
     child: Child,
     /// Where its HTTP interface listens, HOST:PORT.
     address: String,
 }
 
-impl Drop for Board {
+impl Drop for Simulator {
     fn drop(&mut self) {
         // A failure means that the process has already ended.
         let _ = self.child.kill();
@@ -84,16 +70,18 @@ impl Drop for Board {
     }
 }
 
-impl Board {
-    fn start(directory: &Path, unit: u8, module: &str) -> Self {
+impl Simulator {
+    /// Starts boards with these addresses and modules, and their line at `port`.
+    fn start(port: &Path, units: &[(u8, &str)]) -> Self {
         let variable = |name| env::var_os(name).expect("MODIO_ELF and MODIO_SIM: cargo xtask test");
-        let mut child = Command::new(variable("MODIO_SIM"))
-            .arg("--elf")
-            .arg(variable("MODIO_ELF"))
-            .arg("--pty")
-            .arg(directory.join(format!("unit{unit}")))
-            .args(["--http", "127.0.0.1:0", "--module", module])
-            .args(["--dip", &unit.to_string()])
+        let mut command = Command::new(variable("MODIO_SIM"));
+        command.arg("--elf").arg(variable("MODIO_ELF"));
+        command.arg("--pty").arg(port);
+        command.args(["--http", "127.0.0.1:0"]);
+        for (unit, module) in units {
+            command.args(["--unit", &format!("{unit}:{module}")]);
+        }
+        let mut child = command
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
@@ -106,33 +94,40 @@ impl Board {
         // A full pipe would stop the simulator.
         thread::spawn(move || lines.for_each(drop));
         Self {
-            unit,
             child,
             address: address.trim_end_matches('/').to_owned(),
         }
     }
 
-    /// Reads the outside state of a channel, 1 to 4.
-    fn channel(&self, number: u8) -> Value {
-        let state = http::request(&self.address, "/api/state", None);
-        state["channels"][usize::from(number) - 1].clone()
+    /// Sends a request about a board. Returns the reply's body.
+    fn request(&self, unit: u8, path: &str, body: Option<&Value>) -> Value {
+        let path = format!("/api/boards/unit-{unit}/{path}");
+        http::request(&self.address, &path, body)
     }
 
-    /// Sets the outside state of a channel, 1 to 4.
-    fn set(&self, number: u8, level: &Value) {
-        let path = format!("/api/channels/{number}");
-        http::request(&self.address, &path, Some(level));
+    /// Sets inputs to the values of their outputs.
+    fn carry(&self, wires: &[Loop]) {
+        for Loop { from, to, kind } in wires {
+            let state = self.request(from.0, "state", None);
+            let output = &state["channels"][usize::from(from.1) - 1];
+            let level = match kind {
+                Kind::Digital => json!({ "energised": output["on"] == true }),
+                Kind::Analog(gain) => {
+                    let code = output["code"].as_f64().unwrap_or_default();
+                    let millivolts = (code / 4095.0 * FULL_SCALE * gain).round() as u16;
+                    json!({ "millivolts": millivolts })
+                }
+            };
+            self.request(to.0, &format!("channels/{}", to.1), Some(&level));
+        }
     }
 
-    /// Waits until this time, in ms, has passed on the board.
-    fn wait(&self, time: f64) {
-        let now = || {
-            let state = http::request(&self.address, "/api/state", None);
-            state["virtual_ms"].as_f64().expect("the board has a time")
-        };
-        let end = now() + time;
-        while now() < end {
-            thread::sleep(Duration::from_millis(1));
+    /// Switches the power of a board when the power command has written its file.
+    fn switch(&self, unit: u8, file: &Path) {
+        if let Ok(state) = fs::read_to_string(file) {
+            let on = state.trim() == "on";
+            self.request(unit, "power", Some(&json!({ "on": on })));
+            fs::remove_file(file).expect("the file can be removed");
         }
     }
 }
@@ -170,18 +165,9 @@ impl Bench {
     /// Boards with these addresses and modules.
     pub fn new(units: &[(u8, &str)]) -> Self {
         let directory = tempfile::tempdir().expect("a directory");
-        let boards: Vec<Board> = units
-            .iter()
-            .map(|(unit, module)| Board::start(directory.path(), *unit, module))
-            .collect();
-        let ports: Vec<PathBuf> = units
-            .iter()
-            .map(|(unit, _)| directory.path().join(format!("unit{unit}")))
-            .collect();
-        let port = match &ports[..] {
-            [one] => one.clone(),
-            all => line::join(all),
-        };
+        let port = directory.path().join("line");
+        let simulator = Simulator::start(&port, units);
+        let first = units[0].0;
         let wires = Arc::new(Mutex::new(Vec::new()));
         let stop = Arc::new(AtomicBool::new(false));
         let carrier = {
@@ -189,9 +175,9 @@ impl Bench {
             let power = directory.path().join("power");
             thread::spawn(move || {
                 while !stop.load(Ordering::Relaxed) {
-                    switch(&boards[0], &power);
+                    simulator.switch(first, &power);
                     let wires = wires.lock().expect("no test fails with the lock").clone();
-                    carry(&boards, &wires);
+                    simulator.carry(&wires);
                     thread::sleep(CARRY);
                 }
             })
@@ -265,43 +251,6 @@ impl Bench {
                 .map(|text| String::from_utf8_lossy(&text).into_owned())
                 .concat(),
             report: serde_json::from_str(&report).unwrap_or(Value::Null),
-        }
-    }
-}
-
-/// Switches the power of a board when the power command has written its file.
-fn switch(board: &Board, file: &Path) {
-    if let Ok(state) = fs::read_to_string(file) {
-        let on = state.trim() == "on";
-        http::request(&board.address, "/api/power", Some(&json!({ "on": on })));
-        fs::remove_file(file).expect("the file can be removed");
-    }
-}
-
-/// Sets inputs to the values of their outputs.
-fn carry(boards: &[Board], wires: &[Loop]) {
-    let board = |unit| {
-        let mut boards = boards.iter();
-        boards.find(|board| board.unit == unit).expect("a board")
-    };
-    for Loop { from, to, kind } in wires {
-        let output = board(from.0).channel(from.1);
-        let other = board(to.0);
-        match kind {
-            Kind::Bouncing if output["on"] == true && other.channel(to.1)["energised"] == false => {
-                for on in [true, false, true] {
-                    other.set(to.1, &json!({ "energised": on }));
-                    other.wait(BOUNCE);
-                }
-            }
-            Kind::Digital | Kind::Bouncing => {
-                other.set(to.1, &json!({ "energised": output["on"] == true }));
-            }
-            Kind::Analog(gain) => {
-                let code = output["code"].as_f64().unwrap_or_default();
-                let millivolts = (code / 4095.0 * FULL_SCALE * gain).round() as u16;
-                other.set(to.1, &json!({ "millivolts": millivolts }));
-            }
         }
     }
 }

@@ -215,10 +215,10 @@ fn signals_end_the_simulator_during_a_long_request() {
     });
     running.signal("-INT");
     assert_eq!(running.end(), (Some(0), String::new()));
-    // The connection may end with an error.
+    // The connection may end with an error before the reply is read.
     let mut reply = String::new();
     let _ = client.stream.read_line(&mut reply);
-    assert_eq!(reply, "", "the request was not over");
+    assert!(!reply.starts_with("ok "), "the request was over: {reply}");
 }
 
 #[test]
