@@ -67,7 +67,7 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// The unit's address.
+    /// Returns the unit's address.
     #[must_use]
     pub fn unit(&self) -> u8 {
         self.target.unit
@@ -79,7 +79,7 @@ impl<'a> Bench<'a> {
         if self.target.unit == 42 { 43 } else { 42 }
     }
 
-    /// The frame of a request to this unit.
+    /// Returns the frame of a request to this unit.
     #[must_use]
     pub fn frame(&self, pdu: &[u8]) -> Vec<u8> {
         self.target.mode.frame(self.target.unit, pdu)
@@ -276,13 +276,13 @@ impl<'a> Bench<'a> {
         self.ensure(self.is_pong(&reply), wanted)
     }
 
-    /// The frame of the request of [`Bench::alive`].
+    /// Returns the frame of the request of [`Bench::alive`].
     #[must_use]
     pub fn ping(&self) -> Vec<u8> {
         self.frame(&self.target.ping)
     }
 
-    /// Whether a reply is right for the request of [`Bench::alive`].
+    /// Returns whether a reply is right for the request of [`Bench::alive`].
     #[must_use]
     pub fn is_pong(&self, reply: &Reply) -> bool {
         matches!(reply, Reply::Pdu(pdu) if pdu[0] == self.target.ping[0])

@@ -55,7 +55,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// The name in lists and reports.
+    /// Returns the name in lists and reports.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -84,7 +84,7 @@ pub struct Case {
 }
 
 impl Case {
-    /// The same case as an interpretation of the standards.
+    /// Returns the same case as an interpretation of the standards.
     #[must_use]
     pub const fn interpretation(mut self) -> Self {
         self.kind = Kind::Interpretation;

@@ -134,13 +134,13 @@ fn setting(text: &str) -> Result<(u16, u16), String> {
 }
 
 impl Cli {
-    /// The line's rate and format.
+    /// Returns the line's rate and format.
     #[must_use]
     pub fn line(&self) -> LineFormat {
         LineFormat::new(self.baud, self.format)
     }
 
-    /// The transmission mode, by the option or the profile.
+    /// Returns the transmission mode, by the option or the profile.
     ///
     /// # Errors
     ///
@@ -153,7 +153,7 @@ impl Cli {
         Ok(mode.unwrap_or_default())
     }
 
-    /// The unit's address.
+    /// Returns the unit's address.
     #[must_use]
     pub fn unit(&self, profile: Option<&Profile>) -> u8 {
         let unit = self.unit.or_else(|| profile.and_then(|p| p.unit));
@@ -162,7 +162,7 @@ impl Cli {
         unit.unwrap_or(1)
     }
 
-    /// The profile, if one is given.
+    /// Returns the profile, if one is given.
     ///
     /// # Errors
     ///
@@ -222,13 +222,13 @@ impl Cli {
         )
     }
 
-    /// The waiting times on this endpoint.
+    /// Returns the waiting times on this endpoint.
     #[must_use]
     pub fn waits(&self, endpoint: &dyn Endpoint) -> Patience {
         waits(endpoint, self.patience.map(Duration::from_millis))
     }
 
-    /// The cases to run.
+    /// Returns the cases to run.
     ///
     /// # Errors
     ///
@@ -247,7 +247,7 @@ impl Cli {
     }
 }
 
-/// The cases whose names contain one of these parts; all when there is none.
+/// Returns the cases whose names contain one of these parts; all when there is none.
 ///
 /// # Errors
 ///
@@ -264,8 +264,8 @@ pub fn chosen(parts: &[String]) -> Result<Vec<Case>> {
     Ok(cases)
 }
 
-/// The waiting times on an endpoint. Where time is exact, the line sets them. Elsewhere they allow for a slow operating
-/// system, and for a simulator that is slower than its clock.
+/// Returns the waiting times on an endpoint. Where time is exact, the line sets them. Elsewhere they allow for a slow
+/// operating system, and for a simulator that is slower than its clock.
 #[must_use]
 pub fn waits(endpoint: &dyn Endpoint, reply: Option<Duration>) -> Patience {
     let line = endpoint.line();

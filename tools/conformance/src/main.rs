@@ -71,7 +71,7 @@ fn test(cli: &Cli) -> anyhow::Result<u8> {
     Ok(u8::from(Totals::of(&outcomes).counted(strict) > 0))
 }
 
-/// The results of the probe, in one line.
+/// Returns the results of the probe, in one line.
 fn found(target: &Target) -> String {
     let functions: Vec<String> = target
         .functions

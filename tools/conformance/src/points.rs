@@ -6,20 +6,20 @@ use crate::bench::Bench;
 use crate::case::{Check, Stop};
 use crate::target::{Span, Words};
 
-/// A request's function, address and one more word.
+/// Returns a request's function, address and one more word.
 #[must_use]
 pub fn pdu(function: u8, address: u16, word: u16) -> Vec<u8> {
     let ([ah, al], [wh, wl]) = (address.to_be_bytes(), word.to_be_bytes());
     vec![function, ah, al, wh, wl]
 }
 
-/// A request of function 08.
+/// Returns a request of function 08.
 #[must_use]
 pub fn diagnose(sub: u16, data: &[u8]) -> Vec<u8> {
     [&[8], &sub.to_be_bytes()[..], data].concat()
 }
 
-/// A write of several registers, 0x10.
+/// Returns a write of several registers, 0x10.
 #[must_use]
 pub fn write_words(address: u16, values: &[u16]) -> Vec<u8> {
     let mut request = pdu(0x10, address, values.len() as u16);
@@ -28,7 +28,7 @@ pub fn write_words(address: u16, values: &[u16]) -> Vec<u8> {
     request
 }
 
-/// A write of several coils, 0x0F; the padding bits of the last byte are `padding`.
+/// Returns a write of several coils, 0x0F; the padding bits of the last byte are `padding`.
 #[must_use]
 pub fn write_bits(address: u16, values: &[bool], padding: bool) -> Vec<u8> {
     let mut request = pdu(0x0F, address, values.len() as u16);
@@ -42,7 +42,7 @@ pub fn write_bits(address: u16, values: &[bool], padding: bool) -> Vec<u8> {
     request
 }
 
-/// The words of a reply to 03, 04 or 17.
+/// Returns the words of a reply to 03, 04 or 17.
 #[must_use]
 pub fn words_of(reply: &[u8]) -> Vec<u16> {
     let (pairs, _) = reply.get(2..).unwrap_or_default().as_chunks::<2>();
@@ -63,31 +63,32 @@ impl Bench<'_> {
         self.target.bits.ok_or_else(lacking)
     }
 
-    /// Registers to write to.
+    /// Returns the registers to write to.
     pub fn words(&self) -> Check<Words> {
         let lacking = || Stop::Skip("no register to write to".to_owned());
         self.target.words.ok_or_else(lacking)
     }
 
-    /// A value that the registers to write to refuse.
+    /// Returns a value that the registers to write to refuse.
     pub fn refused_value(&self) -> Check<u16> {
         let lacking = || Stop::Skip("no value is known that is refused".to_owned());
         self.words()?.refused.ok_or_else(lacking)
     }
 
-    /// The longest run that a function (1 to 4) reads.
+    /// Returns the longest run that a function (1 to 4) reads.
     pub fn readable(&self, function: u8) -> Check<Span> {
         let lacking = || Stop::Skip(format!("nothing to read by function {function:02X}"));
         self.target.longest(function).ok_or_else(lacking)
     }
 
-    /// An address that a function (1 to 4) cannot read.
+    /// Returns an address that a function (1 to 4) cannot read.
     pub fn nowhere(&self, function: u8) -> Check<u16> {
         let lacking = || Stop::Skip("every address exists".to_owned());
         self.target.nowhere(function).ok_or_else(lacking)
     }
 
-    /// The addresses next to what a function (1 to 4) reads, and 0xFFFF, as far as the function cannot read them.
+    /// Returns the addresses next to what a function (1 to 4) reads, and 0xFFFF, as far as the function cannot read
+    /// them.
     #[must_use]
     pub fn outside(&self, function: u8) -> Vec<u16> {
         let spans = self.target.readable(function);

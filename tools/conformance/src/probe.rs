@@ -137,7 +137,7 @@ fn first_answer(
     ask(endpoint, target, patience, pdu)
 }
 
-/// A request that shows whether the unit has a function, and changes nothing.
+/// Returns a request that shows whether the unit has a function, and changes nothing.
 fn harmless(target: &Target, function: u8) -> Result<Vec<u8>> {
     let nowhere = || {
         target
@@ -159,7 +159,7 @@ fn harmless(target: &Target, function: u8) -> Result<Vec<u8>> {
     })
 }
 
-/// An ordinary request: a short read, else an echo.
+/// Returns an ordinary request: a short read, else an echo.
 fn ping(target: &Target) -> Option<Vec<u8>> {
     let read = (1..=4)
         .filter(|function| target.has(*function))

@@ -85,7 +85,7 @@ impl Profile {
         toml::from_str(text).map_err(|error| anyhow!(error.to_string().trim().replace('\n', " ")))
     }
 
-    /// The mode, if the profile names it.
+    /// Returns the mode, if the profile names it.
     ///
     /// # Errors
     ///
@@ -99,7 +99,7 @@ impl Profile {
         })
     }
 
-    /// The unit's points.
+    /// Returns the unit's points.
     ///
     /// # Errors
     ///
@@ -159,7 +159,7 @@ impl Profile {
 }
 
 impl Table {
-    /// The run to write to, if there is one. It must be readable, because its values are restored.
+    /// Returns the run to write to, if there is one. It must be readable, because its values are restored.
     fn one_to_write(&self, name: &str) -> Result<Option<Span>> {
         let run = match spans(&self.write)?[..] {
             [] => return Ok(None),

@@ -144,7 +144,7 @@ fn move_to(bench: &mut Bench<'_>, to: LineFormat) -> Check {
     }
 }
 
-/// The value of the register FORMAT for a format; [`Stop::Skip`] when the device does not have the format.
+/// Returns the value of the register FORMAT for a format; [`Stop::Skip`] when the device does not have the format.
 fn format_code(line: LineFormat) -> Check<u16> {
     let name = line.format.to_string();
     let known = Format::NAMES.iter().find(|(_, known)| *known == name);

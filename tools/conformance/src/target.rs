@@ -18,7 +18,7 @@ pub struct Span {
 }
 
 impl Span {
-    /// A span of one address.
+    /// Returns a span of one address.
     #[must_use]
     pub const fn one(address: u16) -> Self {
         Self {
@@ -27,7 +27,7 @@ impl Span {
         }
     }
 
-    /// Number of addresses, 1 to 65536.
+    /// Returns the number of addresses, 1 to 65536.
     #[must_use]
     pub fn len(self) -> u32 {
         u32::from(self.last - self.first) + 1
@@ -39,7 +39,7 @@ impl Span {
         false
     }
 
-    /// The first addresses, `most` at most.
+    /// Returns the first addresses, `most` at most.
     #[must_use]
     pub fn up_to(self, most: u16) -> Self {
         let last = self.first.saturating_add(most.saturating_sub(1));
@@ -49,7 +49,7 @@ impl Span {
         }
     }
 
-    /// Whether the span contains the address.
+    /// Returns whether the span contains the address.
     #[must_use]
     pub const fn has(self, address: u16) -> bool {
         self.first <= address && address <= self.last
@@ -92,7 +92,8 @@ pub struct Modio {
 }
 
 impl Modio {
-    /// The ports that have a slot, with the modules in force. For an unknown board, the ports that have a module.
+    /// Returns the ports that have a slot, with the modules in force. For an unknown board, the ports that have a
+    /// module.
     pub fn slots(&self) -> impl Iterator<Item = (u16, Module)> {
         let ports = (1..).zip(self.modules);
         ports.filter(|(port, module)| match self.board {
@@ -101,7 +102,7 @@ impl Modio {
         })
     }
 
-    /// The module in the first slot.
+    /// Returns the module in the first slot.
     #[must_use]
     pub fn module(&self) -> Module {
         self.slots()
@@ -109,14 +110,14 @@ impl Modio {
             .map_or(Module::None, |(_, module)| module)
     }
 
-    /// The points of all modules with their kinds, in ascending order of their addresses.
+    /// Returns the points of all modules with their kinds, in ascending order of their addresses.
     pub fn points(&self) -> impl Iterator<Item = (u16, Kind)> {
         let of_slot = |(port, module): (u16, Module)| (points::first(port)..).zip(module.points());
         let points = self.slots().flat_map(of_slot);
         points.filter(|(_, kind)| *kind != Kind::None)
     }
 
-    /// The runs of neighbouring points of these kinds.
+    /// Returns the runs of neighbouring points of these kinds.
     #[must_use]
     pub fn runs(&self, kinds: &[Kind]) -> Vec<Span> {
         let mut runs: Vec<Span> = Vec::new();
@@ -131,7 +132,8 @@ impl Modio {
 }
 
 impl fmt::Display for Modio {
-    /// The module in its slot, such as `4do`; of a board with several slots all of them, such as `1=4do 2=none`.
+    /// Returns the module in its slot, such as `4do`; of a board with several slots all of them, such as `1=4do
+    /// 2=none`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.slots().count() < 2 {
             return self.module().fmt(f);
@@ -169,7 +171,7 @@ pub struct Target {
 }
 
 impl Target {
-    /// The runs that this function (1 to 4) reads.
+    /// Returns the runs that this function (1 to 4) reads.
     #[must_use]
     pub fn readable(&self, function: u8) -> &[Span] {
         match function {
@@ -178,20 +180,20 @@ impl Target {
         }
     }
 
-    /// The longest run that this function reads.
+    /// Returns the longest run that this function reads.
     #[must_use]
     pub fn longest(&self, function: u8) -> Option<Span> {
         let spans = self.readable(function).iter().copied();
         spans.max_by_key(|span| (span.len(), u16::MAX - span.first))
     }
 
-    /// Whether the unit has this function.
+    /// Returns whether the unit has this function.
     #[must_use]
     pub fn has(&self, function: u8) -> bool {
         self.functions.get(&function) == Some(&Support::Yes)
     }
 
-    /// The highest address that this function (1 to 4) cannot read.
+    /// Returns the highest address that this function (1 to 4) cannot read.
     #[must_use]
     pub fn nowhere(&self, function: u8) -> Option<u16> {
         let spans = self.readable(function);
@@ -200,7 +202,7 @@ impl Target {
             .find(|address| !spans.iter().any(|span| span.has(*address)))
     }
 
-    /// The highest address without a coil, or without a register, for a function that writes.
+    /// Returns the highest address without a coil, or without a register, for a function that writes.
     #[must_use]
     pub fn nowhere_to_write(&self, function: u8) -> Option<u16> {
         match function {

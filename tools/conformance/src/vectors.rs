@@ -22,7 +22,7 @@ pub struct Worked {
 }
 
 impl Worked {
-    /// The frame without its CRC, and the CRC as printed.
+    /// Returns the frame without its CRC, and the CRC as printed.
     fn parts(&self) -> (&[u8], [u8; 2]) {
         match self.bytes.split_last_chunk::<2>() {
             Some((body, printed)) => (body, *printed),
@@ -30,7 +30,7 @@ impl Worked {
         }
     }
 
-    /// Whether the printed CRC is right.
+    /// Returns whether the printed CRC is right.
     #[must_use]
     pub fn crc_ok(&self) -> bool {
         let (body, printed) = self.parts();
@@ -38,7 +38,7 @@ impl Worked {
     }
 }
 
-/// Every worked frame, in the order of the manuals.
+/// Returns every worked frame, in the order of the manuals.
 pub fn frames() -> impl Iterator<Item = Worked> {
     DATA.lines()
         .filter(|line| !line.is_empty() && !line.starts_with('#'))
@@ -60,7 +60,7 @@ fn worked(line: &'static str) -> Option<Worked> {
     })
 }
 
-/// The errata as a table in Markdown.
+/// Returns the errata as a table in Markdown.
 #[must_use]
 pub fn errata() -> String {
     let mut table = "| manual | place | frame as printed | CRC printed | CRC right |\n".to_owned();

@@ -173,7 +173,7 @@ impl Unit {
     }
 }
 
-/// The adapter of this port. The path may be a link to the port.
+/// Returns the adapter of this port. The path may be a link to the port.
 fn adapter(port: &Path, ports: &[SerialPortInfo]) -> Option<Adapter> {
     let name = port.canonicalize().unwrap_or_else(|_| port.to_owned());
     let found = ports.iter().find(|one| Path::new(&one.port_name) == name)?;

@@ -163,7 +163,8 @@ fn follow(
     Ok(())
 }
 
-/// Waits for the time that the input may need, and compares the input with the output. Returns the difference.
+/// Waits for the time that the input may need, and compares the input with the output. Returns the
+/// difference.
 fn compare(bench: &mut Bench<'_>, wire: &Analog, value: u16) -> Check<u16> {
     bench.rest(wire.within)?;
     let input = read_word(bench, 4, wire.to)?;

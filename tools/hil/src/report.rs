@@ -69,7 +69,7 @@ impl Report {
         totals
     }
 
-    /// The names of the cases and tests that failed.
+    /// Returns the names of the cases and tests that failed.
     pub fn failed(&self) -> impl Iterator<Item = &str> {
         let cases = self.outcomes.iter().map(|o| (o.case.name, &o.verdict));
         let findings = self.findings.iter().map(|f| (f.name.as_str(), &f.verdict));

@@ -58,7 +58,7 @@ impl Cli {
 }
 
 impl Setup {
-    /// The serial port, if the line is on one.
+    /// Returns the serial port, if the line is on one.
     #[must_use]
     pub fn port(&self) -> Option<&Path> {
         let port = self.cli.port.as_deref().or(self.file.port.as_deref());
@@ -92,7 +92,7 @@ impl Setup {
         })
     }
 
-    /// How to write the image, if the image is written.
+    /// Returns how to write the image, if the image is written.
     #[must_use]
     pub fn flash(&self) -> Option<Flash> {
         let probe = self.cli.probe.as_ref().or(self.file.probe.as_ref());
@@ -102,14 +102,14 @@ impl Setup {
         })
     }
 
-    /// The command that resets the board, if there is one.
+    /// Returns the command that resets the board, if there is one.
     #[must_use]
     pub fn reset(&self) -> Option<&str> {
         let command = self.cli.reset_cmd.as_deref();
         command.or(self.file.reset_cmd.as_deref())
     }
 
-    /// The tests to run on this line.
+    /// Returns the tests to run on this line.
     ///
     /// # Errors
     ///

@@ -70,7 +70,7 @@ pub struct Powered {
 }
 
 impl Powered {
-    /// The unit on `line` is on. `command`, followed by `off` or `on`, switches its power.
+    /// Returns a line to a unit whose power is on. `command`, followed by `off` or `on`, switches its power.
     #[must_use]
     pub const fn new(line: Box<dyn Endpoint>, command: String) -> Self {
         Self {
@@ -127,7 +127,7 @@ mod tests {
     use super::*;
     use crate::fake::Line;
 
-    /// A line whose power is switched by a script that writes its argument to a file.
+    /// Returns a line whose power is switched by a script that writes its argument to a file.
     fn powered(directory: &std::path::Path, fails: &str) -> Powered {
         let log = directory.join("log");
         let command = format!("f() {{ echo $1 >> '{}'; {fails} }}; f", log.display());

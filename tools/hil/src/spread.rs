@@ -23,8 +23,8 @@ impl Spread {
         (!times.is_empty()).then_some(Self { times })
     }
 
-    /// The time that `percent` of a hundred times do not exceed, by the nearest rank: 0 is the minimum,
-    /// 50 the median, 100 the maximum. Each result is a time that was measured.
+    /// Returns the time that `percent` of a hundred times do not exceed, by the nearest rank: 0 is the minimum, 50 the
+    /// median, 100 the maximum. Each result is a time that was measured.
     #[must_use]
     pub fn percentile(&self, percent: u8) -> Duration {
         let count = self.times.len();
@@ -66,7 +66,7 @@ impl Spread {
     }
 }
 
-/// Microseconds as milliseconds, for people.
+/// Returns the microseconds as milliseconds, for people.
 fn ms(us: u128) -> String {
     format!("{}.{:03}", us / 1000, us % 1000)
 }

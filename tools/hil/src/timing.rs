@@ -47,7 +47,7 @@ pub struct Tally {
 /// Resolution of the measured turnarounds.
 const TOLERANCE: Duration = Duration::from_micros(1);
 
-/// The shortest time that this number of requests takes at the line's rate.
+/// Returns the shortest time that this number of requests takes at the line's rate.
 #[must_use]
 pub fn least(bench: &Bench<'_>, requests: u32) -> Duration {
     let line = bench.endpoint.line();

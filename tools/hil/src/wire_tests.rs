@@ -102,7 +102,7 @@ fn pulses_that_are_all_counted_pass_and_any_other_count_fails() {
 const ANALOG: &str = "[[analog]]\nfrom = { point = 18 }\nto = { point = 16 }\ntolerance = 20\n\
                       [[analog]]\nfrom = { point = 19 }\nto = { point = 17 }\ntolerance = 20\n";
 
-/// A unit whose two analog outputs are wired to its two analog inputs, each with an error of 20 codes.
+/// Returns a unit whose two analog outputs are wired to its two analog inputs, each with an error of 20 codes.
 fn analog() -> (Line, Plan) {
     let mut line = Line::new(&[1]);
     line.analog = vec![([(1, 18), (1, 16)], 20), ([(1, 19), (1, 17)], 20)];

@@ -33,7 +33,7 @@ impl Session {
         Ok(self.finish(board, request))
     }
 
-    /// The reply to a request that has [begun](begin), once its time is over.
+    /// Returns the reply to a request that has [begun](begin), once its time is over.
     pub fn finish(&mut self, board: &mut Board, request: &Request) -> Reply {
         let now = duration(board.now());
         match request {
@@ -128,8 +128,8 @@ fn hello(board: &mut Board) -> Hello {
     }
 }
 
-/// The module in the slot of a board that has one, such as `4do`; of a board with several slots the modules by port,
-/// such as `1=4do 2=none`.
+/// Returns the module in the slot of a board that has one, such as `4do`; of a board with several slots the modules by
+/// port, such as `1=4do 2=none`.
 fn fitted(board: &Board) -> String {
     let slots: Vec<_> = board.slots().collect();
     if let [(_, slot)] = slots[..] {
@@ -191,7 +191,7 @@ fn check(settings: Settings, pieces: &[Piece]) -> Result<(), String> {
     Ok(())
 }
 
-/// A character with low stop bits, and one more bit that brings the line back up.
+/// Returns a character with low stop bits, and one more bit that brings the line back up.
 fn with_low_stop(settings: Settings, byte: u8) -> Character {
     let mut character = Character::new(settings, byte);
     for bit in character.bits - settings.format.stop_bits()..character.bits {
@@ -202,7 +202,7 @@ fn with_low_stop(settings: Settings, byte: u8) -> Character {
     character
 }
 
-/// The settings of a rate and a format's name.
+/// Returns the settings of a rate and a format's name.
 fn settings(baud: u32, format: &str) -> Result<Settings, String> {
     if !RATES.contains(&baud.into()) {
         return Err(format!("{baud} bit/s is not within 300 to 4000000"));
@@ -227,7 +227,7 @@ mod tests {
     use super::*;
     use crate::{Config, Image, Module};
 
-    /// A board whose core runs an endless loop: a vector table (stack, reset) and `b .` after it.
+    /// Returns a board whose core runs an endless loop: a vector table (stack, reset) and `b .` after it.
     fn board() -> Board {
         let program = [0x00, 0x50, 0x00, 0x20, 0x09, 0x00, 0x00, 0x08, 0xFE, 0xE7];
         let image = Image::from_bytes(&program).expect("a vector table and an instruction");

@@ -44,7 +44,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// What was asked for cannot be: a line on stderr, exit status 2.
+/// Returns what was asked for cannot be: a line on stderr, exit status 2.
 fn refused(what: &str) -> ExitCode {
     eprintln!("modio-sim: {what}");
     ExitCode::from(2)

@@ -30,8 +30,8 @@ pub(super) const CASES: &[Case] = &[
         &[Need::Bits, Need::Function(1)], refused_writes),
 ];
 
-/// Addresses of other units: all of them where time is exact, elsewhere those that differ from this unit's address in
-/// one bit, and 1, 2 and 247.
+/// Returns the addresses of other units: all of them where time is exact, elsewhere those that differ from this unit's
+/// address in one bit, and 1, 2 and 247.
 fn others(bench: &Bench<'_>) -> Vec<u8> {
     let unit = bench.unit();
     let all = bench.endpoint.abilities().exact;

@@ -28,7 +28,7 @@ pub(super) fn unknown_functions(bench: &Bench<'_>) -> Vec<u8> {
     }
 }
 
-/// A function that the unit does not have. Without one the case is skipped.
+/// Returns a function that the unit does not have. Without one the case is skipped.
 pub(super) fn unknown_function(bench: &Bench<'_>) -> Check<u8> {
     let one = unknown_functions(bench).pop();
     one.ok_or_else(|| Stop::Skip("every function exists".to_owned()))

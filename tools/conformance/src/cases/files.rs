@@ -36,13 +36,13 @@ pub(super) const CASES: &[Case] = &[
 /// A group of records: file, first record and number of records.
 type Group = (u16, u16, u16);
 
-/// A group of a request, with this reference type.
+/// Returns a group of a request, with this reference type.
 fn group(reference: u8, (file, record, count): Group) -> Vec<u8> {
     let fields = [file, record, count].map(u16::to_be_bytes);
     [&[reference], fields.as_flattened()].concat()
 }
 
-/// The PDU of a request whose groups have reference type 6.
+/// Returns the PDU of a request whose groups have reference type 6.
 fn request(groups: &[Group]) -> Vec<u8> {
     let groups: Vec<u8> = groups.iter().flat_map(|of| group(6, *of)).collect();
     [&[0x14, groups.len() as u8], &groups[..]].concat()

@@ -32,7 +32,7 @@ pub(super) const CASES: &[Case] = &[
         "a byte after a good frame, without a silence, belongs to it and is never ignored", N, trailing),
 ];
 
-/// Bits to invert, one at a time: all bits where time is exact, elsewhere every ninth.
+/// Returns the bits to invert, one at a time: all bits where time is exact, elsewhere every ninth.
 fn bits(bench: &Bench<'_>, frame: &[u8]) -> Vec<usize> {
     let step = if bench.endpoint.abilities().exact {
         1
@@ -103,7 +103,7 @@ fn short_noise(bench: &mut Bench<'_>) -> Check {
     Ok(())
 }
 
-/// A request for a function that the unit does not have, in a frame of this length with a good CRC.
+/// Returns a request for a function that the unit does not have, in a frame of this length with a good CRC.
 fn of_length(bench: &Bench<'_>, length: usize) -> (u8, Vec<u8>) {
     let unknown = super::dispatch::unknown_functions(bench).pop();
     let function = unknown.unwrap_or(0x6F);

@@ -36,7 +36,7 @@ fn margin(bench: &Bench<'_>) -> Duration {
     line.bits(3).max(Duration::from_micros(20))
 }
 
-/// The request with a gap before the byte at `index`.
+/// Returns the request with a gap before the byte at `index`.
 fn with_gap(bench: &mut Bench<'_>, index: usize, gap: Duration) -> Check<Reply> {
     let frame = bench.ping();
     let (first, rest) = frame.split_at(index);
@@ -68,7 +68,7 @@ fn below_t15(bench: &mut Bench<'_>) -> Check {
     bench.answers(&pieces, "a reply: all gaps are below t1.5")
 }
 
-/// A gap between t1.5 and t3.5 that ends more than a character below t3.5, at any rate and format.
+/// Returns a gap between t1.5 and t3.5 that ends more than a character below t3.5, at any rate and format.
 fn middle(bench: &Bench<'_>) -> Duration {
     let line = bench.endpoint.line();
     let (above, below) = (line.t15_limits().most, line.t35_limits().least);

@@ -34,7 +34,7 @@ pub(super) const CASES: &[Case] = &[
         &[Need::Modio, Need::Config, Need::Exact, Need::Function(6)], super::outputs::torn),
 ];
 
-/// Number of random frames, or bursts of noise: more where the host does not have to wait for them.
+/// Returns the number of random frames, or bursts of noise: more where the host does not have to wait for them.
 fn many(bench: &Bench<'_>) -> usize {
     if bench.endpoint.abilities().exact {
         500

@@ -83,7 +83,7 @@ fn refused_broadcast(bench: &mut Bench<'_>) -> Check {
     bench.silence_to(&frame, "a broadcast")
 }
 
-/// A request whose check is wrong.
+/// Returns a request whose check is wrong.
 pub(super) fn bad(bench: &Bench<'_>) -> Vec<u8> {
     let mut frame = bench.ping();
     let digit = frame.len() - 3;

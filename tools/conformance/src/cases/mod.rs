@@ -27,8 +27,8 @@ mod write_words;
 
 use crate::case::Case;
 
-/// Every case, in the order in which they run. Cases that reset counters are late, and cases that restart the unit are
-/// last.
+/// Returns every case, in the order in which they run. Cases that reset counters are late, and cases that restart the
+/// unit are last.
 #[must_use]
 pub fn all() -> Vec<Case> {
     [

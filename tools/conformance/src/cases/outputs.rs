@@ -26,7 +26,7 @@ pub(super) const CASES: &[Case] = &[
         start_value),
 ];
 
-/// The first output of a module: the function that reads it, its address, and a value other than 0.
+/// Returns the first output of a module: the function that reads it, its address, and a value other than 0.
 fn output(bench: &Bench<'_>) -> Check<(u8, u16, u16)> {
     if let Some(span) = bench.target.bits {
         return Ok((1, span.first, 1));
@@ -195,7 +195,7 @@ const FAST: Duration = Duration::from_millis(30);
 /// Number of reads around the end of COMM_TIMEOUT.
 const READS: u32 = 40;
 
-/// The outputs of a module, of one kind.
+/// Returns the outputs of a module, of one kind.
 fn outputs(bench: &Bench<'_>) -> Check<Span> {
     let words = bench.target.words.filter(|words| !words.locked);
     let span = bench.target.bits.or(words.map(|words| words.span));

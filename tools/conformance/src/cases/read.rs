@@ -4,12 +4,12 @@ use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case};
 use crate::points::pdu;
 
-/// The largest quantity of one request (V1.1b3, 6.1 to 6.4).
+/// Returns the largest quantity of one request (V1.1b3, 6.1 to 6.4).
 const fn most(function: u8) -> u16 {
     if function <= 2 { 2000 } else { 125 }
 }
 
-/// Number of data bytes of a reply.
+/// Returns the number of data bytes of a reply.
 fn data_bytes(function: u8, quantity: u16) -> usize {
     if function <= 2 {
         usize::from(quantity).div_ceil(8)
@@ -94,7 +94,7 @@ pub(super) const ALIKE: &[Case] = &[
         &[Need::Modio, Need::Function(3), Need::Function(4)], alike::<3, 4>),
 ];
 
-/// The first readable address, or 0.
+/// Returns the first readable address, or 0.
 fn somewhere(bench: &Bench<'_>, function: u8) -> u16 {
     let first = bench.target.readable(function).first();
     first.map_or(0, |span| span.first)

@@ -25,7 +25,7 @@ pub(super) const CASES: &[Case] = &[
         back_to_back),
 ];
 
-/// The shortest t3.5 that a unit may use, or the silence that a modio is set to instead.
+/// Returns the shortest t3.5 that a unit may use, or the silence that a modio is set to instead.
 ///
 /// # Errors
 ///
@@ -43,7 +43,7 @@ pub fn silence(bench: &mut Bench<'_>) -> Check<Duration> {
     Ok(line.t35_limits().least)
 }
 
-/// The time from the end of the last request to the first start bit of the reply.
+/// Returns the time from the end of the last request to the first start bit of the reply.
 fn turnaround(bench: &Bench<'_>) -> Duration {
     let first = bench.received.first().map_or(Duration::ZERO, |h| h.start);
     first.saturating_sub(bench.sent_end)

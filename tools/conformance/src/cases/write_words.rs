@@ -121,7 +121,7 @@ fn quantity_out_of_range(bench: &mut Bench<'_>) -> Check {
     Ok(())
 }
 
-/// The 123 registers that a case may write to, if the unit has that many. The case must restore their values.
+/// Returns the 123 registers that a case may write to, if the unit has that many. The case must restore their values.
 pub(super) fn wide(bench: &mut Bench<'_>) -> Check<Option<Span>> {
     let config = bench.target.modio.is_some() && bench.allow_config && bench.target.has(3);
     if config {

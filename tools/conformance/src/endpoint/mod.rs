@@ -87,13 +87,13 @@ pub trait Endpoint {
     /// Its abilities.
     fn abilities(&self) -> Abilities;
 
-    /// The rate and format of the line, as set or as given by the user.
+    /// Returns the rate and format of the line, as set or as given by the user.
     fn line(&self) -> LineFormat;
 
     /// Changes rate and format.
     fn set_line(&mut self, line: LineFormat) -> Result<(), Broken>;
 
-    /// The time of its clock.
+    /// Returns the time of its clock.
     fn now(&self) -> Duration;
 
     /// Lets time pass.
@@ -134,8 +134,8 @@ pub trait Endpoint {
         ))
     }
 
-    /// What the firmware has done since the last call that a real part would not accept, such as a byte that was lost
-    /// because the driver was off. Only a simulator reports this.
+    /// Returns what the firmware has done since the last call that a real part would not accept, such as a byte that
+    /// was lost because the driver was off. Only a simulator reports this.
     fn take_complaints(&mut self) -> Result<Vec<String>, Broken> {
         Ok(Vec::new())
     }

@@ -39,7 +39,7 @@ pub struct Fitting {
 }
 
 impl Fitting {
-    /// A board with this image and empty slots, set as in the factory: address 1, 9600 8N2, RTU.
+    /// Returns a board with this image and empty slots, set as in the factory: address 1, 9600 8N2, RTU.
     #[must_use]
     pub fn new(elf: PathBuf, board: &'static register_map::Board) -> Self {
         Self {
@@ -94,7 +94,7 @@ impl Transport for InProcess {
     }
 }
 
-/// The contents of a flash in which these settings are stored.
+/// Returns the contents of a flash in which these settings are stored.
 fn flash(fitting: &Fitting, config: &Config) -> Result<Vec<u8>, Broken> {
     let mut pairs: Vec<_> = configuration::modules(config.plugged()).collect();
     pairs.extend(line_settings(fitting.line)?);
@@ -106,7 +106,7 @@ fn flash(fitting: &Fitting, config: &Config) -> Result<Vec<u8>, Broken> {
     flash.ok_or_else(|| Broken("too many settings for a page of the store".to_owned()))
 }
 
-/// The registers and values for this rate and format.
+/// Returns the registers and values for this rate and format.
 fn line_settings(line: LineFormat) -> Result<[(u16, u16); 2], Broken> {
     let baud = Baud::ALL
         .iter()

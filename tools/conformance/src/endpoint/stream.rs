@@ -121,7 +121,8 @@ impl Stream {
     }
 }
 
-/// Connects to the first address of the host that answers. A request is sent immediately, not together with later bytes.
+/// Connects to the first address of the host that answers. A request is sent immediately, not together with later
+/// bytes.
 pub(super) fn connect(address: &str) -> Result<TcpStream, String> {
     let found = address.to_socket_addrs();
     let found = found.map_err(|error| format!("no address such as 127.0.0.1:5020: {error}"))?;

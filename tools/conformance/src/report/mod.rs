@@ -47,7 +47,7 @@ impl Totals {
         }
     }
 
-    /// Number of failed cases that make the run fail. Interpretations count only when `strict` is set.
+    /// Returns the number of failed cases that make the run fail. Interpretations count only when `strict` is set.
     #[must_use]
     pub const fn counted(&self, strict: bool) -> usize {
         if strict {

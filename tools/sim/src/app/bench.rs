@@ -37,7 +37,7 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// A bench with these boards; at least one.
+    /// Returns a bench with these boards; at least one.
     pub fn new(boards: Vec<(Board, Unit)>) -> Self {
         let (boards, units) = boards.into_iter().unzip();
         let mut bus = Bus::new(boards);
@@ -61,12 +61,12 @@ impl Bench {
         self.endpoints.push((name, address));
     }
 
-    /// The first board. Requests without the name of a board mean this one.
+    /// Returns the first board. Requests without the name of a board mean this one.
     pub fn first(&mut self) -> &mut Board {
         self.bus.board_mut(0)
     }
 
-    /// The virtual time.
+    /// Returns the virtual time.
     pub fn now(&self) -> Time {
         self.bus.now()
     }
@@ -283,7 +283,7 @@ impl Bench {
     }
 }
 
-/// Voltage at the pin of an analog input, in mV; `None` for another kind of channel.
+/// Returns the voltage at the pin of an analog input, in mV; `None` for another kind of channel.
 fn millivolts(board: &Board, input: Input) -> Option<u16> {
     let mut slots = board.slots();
     let (_, slot) = slots.find(|(port, _)| input.port.is_none_or(|wanted| wanted == *port))?;

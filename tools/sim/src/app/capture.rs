@@ -66,7 +66,7 @@ impl Capture {
         }
     }
 
-    /// Whether a write has failed, which has ended the recording.
+    /// Returns whether a write has failed, which has ended the recording.
     pub fn failed(&self) -> bool {
         self.recorder.is_none()
     }

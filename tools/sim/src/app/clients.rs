@@ -1,5 +1,5 @@
-//! Limits the clients of an endpoint on TCP, so that connections that nobody uses cannot shut others out, and cannot use
-//! up the threads, the memory or the open files of the simulator.
+//! Limits the clients of an endpoint on TCP, so that connections that nobody uses cannot shut others out, and cannot
+//! use up the threads, the memory or the open files of the simulator.
 
 use std::io;
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
@@ -55,7 +55,7 @@ pub struct Client {
 }
 
 impl Client {
-    /// The connection.
+    /// Returns the connection.
     pub fn stream(&self) -> &TcpStream {
         &self.link.stream
     }
@@ -71,7 +71,7 @@ impl Client {
         self.link.close();
     }
 
-    /// Whether the simulator has closed the connection.
+    /// Returns whether the simulator has closed the connection.
     pub fn is_closed(&self) -> bool {
         self.link.closed.load(Ordering::Acquire)
     }
@@ -148,7 +148,7 @@ mod tests {
 
     use super::*;
 
-    /// An endpoint that sends back the bytes that it receives.
+    /// Returns an endpoint that sends back the bytes that it receives.
     fn echo() -> SocketAddr {
         let serve = |client: Client| {
             thread::spawn(move || {
@@ -169,7 +169,7 @@ mod tests {
         stream
     }
 
-    /// Whether the endpoint answers.
+    /// Returns whether the endpoint answers.
     fn answers(mut stream: &TcpStream) -> bool {
         stream.write_all(b"x").is_ok() && matches!(stream.read(&mut [0]), Ok(1))
     }

@@ -21,7 +21,7 @@ pub struct Disturbance {
 }
 
 impl Default for Disturbance {
-    /// A quiet line.
+    /// Returns a quiet line.
     fn default() -> Self {
         Self {
             bit_error_rate: 0.0,
@@ -101,7 +101,7 @@ impl Disturbance {
 struct Strikes(Option<Time>);
 
 impl Strikes {
-    /// Time of the next event, not before `now`.
+    /// Returns the time of the next event, not before `now`.
     fn next(&mut self, hz: f64, now: Time, chance: &mut Rng) -> Time {
         let at = *self.0.get_or_insert_with(|| now + pause(hz, chance));
         at.max(now)

@@ -144,7 +144,7 @@ impl Requests {
         }
     }
 
-    /// Whether a request is under way.
+    /// Returns whether a request is under way.
     pub fn busy(&self) -> bool {
         self.under_way.is_some()
     }

@@ -53,7 +53,7 @@ fn named<'de, D: Deserializer<'de>, T: Deserialize<'de>>(value: D) -> Result<Opt
 }
 
 impl Faults {
-    /// Whether no fault is named.
+    /// Returns whether no fault is named.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }

@@ -49,14 +49,14 @@ enum Way {
     Tx,
 }
 
-/// The recorded frames with numbers above `since`, oldest first.
+/// Returns the recorded frames with numbers above `since`, oldest first.
 pub fn since(line: &Line, since: u64) -> Frames {
     Frames {
         frames: line.frames_since(since).map(frame).collect(),
     }
 }
 
-/// A frame as it is in JSON.
+/// Returns a frame as it is in JSON.
 pub fn frame(frame: &Frame) -> OneFrame {
     OneFrame {
         number: frame.number,
@@ -76,14 +76,14 @@ pub fn frame(frame: &Frame) -> OneFrame {
     }
 }
 
-/// The meaning of a frame as text, as in `modioctl sniff`.
+/// Returns the meaning of a frame as text, as in `modioctl sniff`.
 pub fn summary(frame: &Frame) -> String {
     let framing = Framing::on_line(&frame.bytes).unwrap_or_default();
     let request = frame.request.as_deref();
     decode::frame(framing, way(frame.direction), &frame.bytes, request)
 }
 
-/// The direction of a frame, in the terms of the standard.
+/// Returns the direction of a frame, in the terms of the standard.
 pub fn way(direction: Direction) -> modbus_line::Direction {
     match direction {
         Direction::FromMaster => modbus_line::Direction::Request,

@@ -29,7 +29,7 @@ fn elf(board: &Board) -> Option<Vec<u8>> {
     inside.map(|(_, elf)| elf.to_vec())
 }
 
-/// The version of the program, and on a line for each image inside it the version of that firmware.
+/// Returns the version of the program, and on a line for each image inside it the version of that firmware.
 pub fn version() -> String {
     let mut text = format!("modio-sim {}\n", register_map::version!());
     for layout in Layout::ALL {

@@ -60,7 +60,7 @@ impl Default for Live {
 }
 
 impl Live {
-    /// The channel of the events, for the server to subscribe its clients to.
+    /// Returns the channel of the events, for the server to subscribe its clients to.
     pub fn listeners(&self) -> broadcast::Sender<Note> {
         self.listeners.clone()
     }

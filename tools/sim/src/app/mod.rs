@@ -53,8 +53,8 @@ mod unit;
 use bench::Bench;
 pub use inside::version;
 
-/// Virtual time from power-on until the endpoints are made and printed. Every unit answers by then: a unit that prepares
-/// its store, waits for its switch and has no crystal needs 360 ms (docs/safety.md).
+/// Virtual time from power-on until the endpoints are made and printed. Every unit answers by then: a unit that
+/// prepares its store, waits for its switch and has no crystal needs 360 ms (docs/safety.md).
 const START_UP: Time = Time::from_ms(400);
 
 /// Most virtual time, from power-on, that the simulator waits for the first board's LoRa module to enter normal mode,
@@ -92,8 +92,8 @@ enum Origin {
     Gateway,
 }
 
-/// While this exists, the endpoint that has sent an event reads no more bytes from its master, which then has to wait as
-/// at a serial port.
+/// While this exists, the endpoint that has sent an event reads no more bytes from its master, which then has to wait
+/// as at a serial port.
 type Hold = mpsc::Sender<()>;
 
 /// Sends an event with bytes, and waits until the boards' thread wants more. Returns false when the simulator ends.

@@ -1,4 +1,5 @@
-//! Replaces the pseudo-terminal on systems where the simulator has none (`sim::options::PTY`). Nothing is ever received.
+//! Replaces the pseudo-terminal on systems where the simulator has none (`sim::options::PTY`). Nothing is ever
+//! received.
 
 use std::path::Path;
 use std::sync::mpsc::Sender;

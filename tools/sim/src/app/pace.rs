@@ -33,7 +33,7 @@ impl Pace {
     }
 }
 
-/// A span of the wall clock in virtual time.
+/// Returns a span of the wall clock in virtual time.
 pub fn span(duration: Duration) -> Time {
     Time::from_ns(u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX))
 }

@@ -66,7 +66,7 @@ impl Pty {
         })
     }
 
-    /// The terminal's own name: `/dev/pts/N`.
+    /// Returns the terminal's own name: `/dev/pts/N`.
     #[allow(clippy::unnecessary_wraps, reason = "some systems have no terminal")]
     pub fn path(&self) -> Option<&Path> {
         Some(&self.path)
@@ -149,8 +149,8 @@ fn symlink(path: &Path, link: &Path) -> Result<(), String> {
     std::os::unix::fs::symlink(path, link).map_err(|error| error.to_string())
 }
 
-/// Waits until the terminal is ready for one of `wanted`, or until `wait` is over. Returns what it is ready for, and
-/// HUP while no program has it open.
+/// Waits until the terminal is ready for one of `wanted`, or until `wait` is over. Returns what it is ready
+/// for, and HUP while no program has it open.
 fn state(terminal: &OwnedFd, wanted: PollFlags, wait: Option<Duration>) -> PollFlags {
     let mut polled = [PollFd::new(terminal, wanted)];
     let wait = wait.and_then(|wait| Timespec::try_from(wait).ok());

@@ -45,7 +45,7 @@ pub enum Endpoints {
 }
 
 impl Endpoints {
-    /// The pseudo-terminal of the gateway radio.
+    /// Returns the pseudo-terminal of the gateway radio.
     pub fn lora(&self) -> Option<&Path> {
         match self {
             Self::Clock { lora, .. } => lora.as_ref()?.path(),

@@ -211,7 +211,7 @@ fn mode_names() -> RefOr<Schema> {
         .into()
 }
 
-/// The schema of a text that is one of these.
+/// Returns the schema of a text that is one of these.
 fn one_of<const N: usize>(names: [&'static str; N]) -> RefOr<Schema> {
     ObjectBuilder::new()
         .schema_type(Type::String)
@@ -219,7 +219,7 @@ fn one_of<const N: usize>(names: [&'static str; N]) -> RefOr<Schema> {
         .into()
 }
 
-/// The state of board `n`.
+/// Returns the state of board `n`.
 pub fn of_board(bench: &mut Bench, n: usize) -> State {
     let line = bench.bus.line();
     let settings = line.settings();
@@ -260,7 +260,7 @@ pub fn of_board(bench: &mut Bench, n: usize) -> State {
     }
 }
 
-/// The faults in force on the line, in the air, and on board `n`.
+/// Returns the faults in force on the line, in the air, and on board `n`.
 pub fn faults(bench: &mut Bench, n: usize) -> Faults {
     let radio_loss = bench.bus.air().map(|air| air.loss());
     let line = &bench.disturbance;
@@ -280,7 +280,7 @@ pub fn faults(bench: &mut Bench, n: usize) -> Faults {
     }
 }
 
-/// The boards on the line.
+/// Returns the boards on the line.
 pub fn boards(bench: &Bench) -> Vec<OneBoard> {
     let boards = bench.units.iter().zip(bench.bus.boards());
     boards
@@ -299,7 +299,7 @@ pub fn boards(bench: &Bench) -> Vec<OneBoard> {
         .collect()
 }
 
-/// The findings of the chip model of board `n`.
+/// Returns the findings of the chip model of board `n`.
 pub fn findings(bench: &Bench, n: usize) -> Findings {
     let findings = bench.bus.board(n).findings().iter();
     let findings = findings.map(|finding| Finding {
@@ -313,7 +313,7 @@ pub fn findings(bench: &Bench, n: usize) -> Findings {
     }
 }
 
-/// The LoRa module of a board.
+/// Returns the LoRa module of a board.
 fn radio(module: &radio::Module) -> Radio {
     let parameters = module.parameters();
     Radio {
@@ -328,13 +328,13 @@ fn radio(module: &radio::Module) -> Radio {
     }
 }
 
-/// The unit address in force; `None` without power, and if the switch had no valid position at power-on.
+/// Returns the unit address in force; `None` without power, and if the switch had no valid position at power-on.
 fn address(board: &Board) -> Option<u8> {
     let dip = board.dip_at_power_on();
     (board.powered() && matches!(dip, 1..=247 | 255)).then_some(dip)
 }
 
-/// The module that the unit has stored for the slot at `port`.
+/// Returns the module that the unit has stored for the slot at `port`.
 fn configured(board: &Board, port: u8) -> ModuleName {
     board.layout().configured(board.flash(), port).into()
 }

@@ -1,5 +1,5 @@
-//! The RS-485 line as raw bytes on a TCP socket: the bytes of all clients are sent on the line, and every client receives
-//! all bytes on the line except its own.
+//! The RS-485 line as raw bytes on a TCP socket: the bytes of all clients are sent on the line, and every client
+//! receives all bytes on the line except its own.
 
 use std::io::{Read, Write};
 use std::net::SocketAddr;
@@ -54,7 +54,7 @@ impl Tcp {
         Ok(Self { address, outlets })
     }
 
-    /// The address of the socket: with port 0 the system has chosen the port.
+    /// Returns the address of the socket: with port 0 the system has chosen the port.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
@@ -73,8 +73,8 @@ impl Tcp {
 
 /// Starts two threads for a client, one for each direction. They end when the client disconnects.
 fn serve(client: Client, events: Sender<Event>, outlets: Outlets) {
-    // Requests and replies are short and alternate. Collecting more bytes before sending would only delay them. An error
-    // means that the client has already disconnected.
+    // Requests and replies are short and alternate. Collecting more bytes before sending would only delay them. An
+    // error means that the client has already disconnected.
     let _ = client.stream().set_nodelay(true);
     let client = Arc::new(client);
     let (bytes, to_client) = mpsc::sync_channel(WAITING);

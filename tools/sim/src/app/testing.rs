@@ -22,7 +22,7 @@ pub const NO_DIRECTORY: &str = if cfg!(windows) {
 /// Machine code: the vector table (stack, reset), and `b .` after it.
 const LOOP: [u8; 10] = [0x00, 0x50, 0x00, 0x20, 0x09, 0x00, 0x00, 0x08, 0xFE, 0xE7];
 
-/// A board with this module, and its power on.
+/// Returns a board with this module, and its power on.
 pub fn board(module: Module) -> Board {
     board_of(Config {
         module,
@@ -35,7 +35,7 @@ fn board_of(config: Config) -> Board {
     Board::new(&image, config).expect("the image fits into the flash")
 }
 
-/// A bench with one board that has this module, and its power on.
+/// Returns a bench with one board that has this module, and its power on.
 pub fn bench(module: Module) -> Bench {
     bench_of(Config {
         module,
@@ -43,12 +43,12 @@ pub fn bench(module: Module) -> Bench {
     })
 }
 
-/// A bench with one board of this configuration.
+/// Returns a bench with one board of this configuration.
 pub fn bench_of(config: Config) -> Bench {
     bench_of_boards([("modio-02", config)])
 }
 
-/// A bench with several boards and their names.
+/// Returns a bench with several boards and their names.
 pub fn bench_of_boards(boards: impl IntoIterator<Item = (&'static str, Config)>) -> Bench {
     let boards = boards
         .into_iter()

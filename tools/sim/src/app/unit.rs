@@ -27,7 +27,7 @@ pub struct Unit {
 }
 
 impl Unit {
-    /// A unit without any log yet.
+    /// Returns a unit without any log yet.
     pub fn new(name: String, flash: Option<FlashFile>) -> Self {
         Self {
             name,
@@ -39,7 +39,7 @@ impl Unit {
         }
     }
 
-    /// The last lines of the firmware's log, oldest first.
+    /// Returns the last lines of the firmware's log, oldest first.
     pub fn log_tail(&self) -> impl Iterator<Item = &str> {
         self.log.iter().map(String::as_str)
     }

@@ -43,7 +43,7 @@ pub struct Modio {
 }
 
 impl Modio {
-    /// A board with this configuration.
+    /// Returns a board with this configuration.
     #[must_use]
     pub fn new(config: &Config) -> Self {
         let slots = config.layout.slots.iter().zip(config.plugged());
@@ -151,7 +151,7 @@ impl Circuit for Modio {
 }
 
 impl Modio {
-    /// Levels of the I2C wires as the modules hold them. Each module can hold a wire low.
+    /// Returns the levels of the I2C wires as the modules hold them. Each module can hold a wire low.
     fn held(&self) -> Wires {
         all(self.slots.iter().map(Slot::held))
     }
@@ -193,7 +193,7 @@ impl Bus for Modio {
     }
 }
 
-/// The wired AND: each wire is high only if it is high in all of `wires`.
+/// Returns the wired AND: each wire is high only if it is high in all of `wires`.
 fn all(wires: impl Iterator<Item = Wires>) -> Wires {
     wires.fold(Wires::FREE, |a, b| Wires {
         scl: a.scl && b.scl,

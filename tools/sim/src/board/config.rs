@@ -37,7 +37,7 @@ impl Default for Config {
 }
 
 impl Config {
-    /// Port number and module of every slot of the board.
+    /// Returns the port number and module of every slot of the board.
     #[must_use]
     pub fn plugged(&self) -> Vec<(u8, Module)> {
         let ports = self.layout.slots.iter().map(|slot| slot.port);

@@ -108,7 +108,7 @@ impl Layout {
     /// All types of boards.
     pub const ALL: [&'static Self; 2] = [&MODIO_02, &MODIO_08];
 
-    /// The layout of a board of the register map.
+    /// Returns the layout of a board of the register map.
     #[must_use]
     pub fn of(board: &Board) -> Option<&'static Self> {
         Self::ALL.into_iter().find(|layout| layout.board == board)

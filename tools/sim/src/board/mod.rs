@@ -1,6 +1,6 @@
 //! The modio boards: an STM32F103 with an RS-485 line, slots, a DIP switch, LEDs and a LoRa module. [`layout`] has the
-//! pins of each board, [`circuit`] what is connected to them, [`radio`] the LoRa module, and [`outside`] the methods that
-//! operate and read a board.
+//! pins of each board, [`circuit`] what is connected to them, [`radio`] the LoRa module, and [`outside`] the methods
+//! that operate and read a board.
 
 mod circuit;
 mod config;
@@ -39,12 +39,12 @@ impl DerefMut for Board {
 }
 
 impl Board {
-    /// A board with `image` in its flash, powered on at time 0.
+    /// Returns a board with `image` in its flash, powered on at time 0.
     ///
     /// # Errors
     ///
-    /// [`f103::Error::Image`] if the image does not fit into the flash or `config.chip.flash` has another size, [`Error::Slot`] if
-    /// `config.slots` names a slot that the board does not have.
+    /// [`f103::Error::Image`] if the image does not fit into the flash or `config.chip.flash` has another size,
+    /// [`Error::Slot`] if `config.slots` names a slot that the board does not have.
     pub fn new(image: &Image, config: Config) -> Result<Self, Error> {
         let ports = config.layout.slots.iter().map(|slot| slot.port);
         let mut named = config.slots.iter().map(|&(port, _)| port);

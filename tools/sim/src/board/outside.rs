@@ -19,13 +19,13 @@ pub struct Leds {
 }
 
 impl Board {
-    /// The DIP switch: bit 0 = position 1, a set bit = ON.
+    /// Returns the DIP switch: bit 0 = position 1, a set bit = ON.
     #[must_use]
     pub fn dip(&self) -> u8 {
         self.circuit().dip
     }
 
-    /// Position of the DIP switch when the power was switched on last, which is in force.
+    /// Returns the position of the DIP switch when the power was switched on last, which is in force.
     #[must_use]
     pub fn dip_at_power_on(&self) -> u8 {
         self.circuit().dip_at_power_on
@@ -36,13 +36,13 @@ impl Board {
         self.change(|circuit| circuit.dip = dip);
     }
 
-    /// Type of the board.
+    /// Returns the type of the board.
     #[must_use]
     pub fn layout(&self) -> &'static Layout {
         self.circuit().layout
     }
 
-    /// The module in the first slot.
+    /// Returns the module in the first slot.
     #[must_use]
     pub fn module(&self) -> Module {
         self.slot().module()
@@ -110,19 +110,19 @@ impl Board {
         self.with_slot(|slot| slot.set_bus_fault(fault));
     }
 
-    /// State of channel `ch` (1 to 4) of the first slot; [`Channel::None`] for any other number.
+    /// Returns the state of channel `ch` (1 to 4) of the first slot; [`Channel::None`] for any other number.
     #[must_use]
     pub fn channel(&self, ch: usize) -> Channel {
         self.slot().channel(ch)
     }
 
-    /// The first slot, for reading.
+    /// Returns the first slot, for reading.
     #[must_use]
     pub fn slot(&self) -> &Slot {
         &self.circuit().slots[0]
     }
 
-    /// The slots with the numbers of their ports, in order.
+    /// Returns the slots with the numbers of their ports, in order.
     pub fn slots(&self) -> impl Iterator<Item = (u8, &Slot)> {
         let ports = self.layout().slots.iter().map(|pins| pins.port);
         ports.zip(&self.circuit().slots)
@@ -150,7 +150,7 @@ impl Board {
         self.change(|circuit| action(&mut circuit.slots[0]))
     }
 
-    /// The LEDs.
+    /// Returns the LEDs.
     #[must_use]
     pub fn leds(&self) -> Leds {
         // Without power PC13 is low, as with the LED on, but the LED is off.
@@ -161,31 +161,33 @@ impl Board {
         }
     }
 
-    /// Whether the RS-485 driver is on (PA8).
+    /// Returns whether the RS-485 driver is on (PA8).
     #[must_use]
     pub fn driver_enable(&self) -> bool {
         self.pin('A', 8)
     }
 
-    /// Number of writes to USART1's data register since the last reset: one for each byte that the firmware sends.
+    /// Returns the number of writes to USART1's data register since the last reset: one for each byte that the firmware
+    /// sends.
     #[must_use]
     pub fn line_bytes_written(&self) -> u64 {
         self.usart1().data_writes()
     }
 
-    /// The RS-485 line, for sending and for reading the record.
+    /// Returns the RS-485 line, for sending and for reading the record.
     pub fn line(&mut self) -> &mut Line {
         self.sync();
         &mut self.circuit_mut().line
     }
 
-    /// The LoRa module; `None` if the board has none.
+    /// Returns the LoRa module; `None` if the board has none.
     #[must_use]
     pub fn radio(&self) -> Option<&radio::Module> {
         self.circuit().radio.as_ref().map(|radio| &radio.module)
     }
 
-    /// Changes the LoRa module at this instant. The part sees the change immediately. `None` if the board has no module.
+    /// Changes the LoRa module at this instant. The part sees the change immediately. `None` if the board has no
+    /// module.
     pub fn change_radio<T>(&mut self, action: impl FnOnce(&mut radio::Module) -> T) -> Option<T> {
         self.change(|circuit| {
             circuit
@@ -200,8 +202,8 @@ impl Board {
         self.change_radio(|module| module.set_fault(fault));
     }
 
-    /// The air with the gateway radio. `None` if the board has no LoRa module, or is on a bus with other boards: see
-    /// [`Bus::air`](crate::Bus::air).
+    /// Returns the air with the gateway radio. `None` if the board has no LoRa module, or is on a bus with other
+    /// boards: see [`Bus::air`](crate::Bus::air).
     pub fn air(&mut self) -> Option<&mut Air> {
         self.sync();
         let now = self.now();

@@ -32,7 +32,7 @@ pub struct Radio {
 }
 
 impl Radio {
-    /// A module without power, which keeps `stored`, and the air.
+    /// Returns a module without power, which keeps `stored`, and the air.
     #[must_use]
     pub fn new(stored: Parameters, corner: Corner) -> Self {
         Self {
@@ -83,13 +83,13 @@ impl Radio {
         self.module.set_power(on);
     }
 
-    /// Whether the module drives AUX in another way than at the last call.
+    /// Returns whether the module drives AUX in another way than at the last call.
     pub(super) fn aux_changed(&mut self) -> bool {
         let aux = self.module.drive_aux();
         core::mem::replace(&mut self.aux, aux) != aux
     }
 
-    /// Whether the module or the air has news for the other.
+    /// Returns whether the module or the air has news for the other.
     fn has_news(&self) -> bool {
         self.module.has_news() || self.air.as_ref().is_some_and(Air::has_news)
     }

@@ -8,7 +8,7 @@ use super::Layout;
 use f103::machine::memory::FLASH_BASE;
 
 impl Layout {
-    /// The two pages of the configuration, as ranges of the flash.
+    /// Returns the two pages of the configuration, as ranges of the flash.
     fn pages(&self) -> [Range<usize>; 2] {
         let store = &self.board.store;
         store.addresses().map(|address| {
@@ -17,7 +17,7 @@ impl Layout {
         })
     }
 
-    /// Whether both pages of the configuration are empty in this flash.
+    /// Returns whether both pages of the configuration are empty in this flash.
     #[must_use]
     pub fn stores_nothing(&self, flash: &[u8]) -> bool {
         let vacant = |page: &Range<usize>| flash.get(page.clone()).is_some_and(record::is_vacant);
@@ -63,8 +63,8 @@ impl Layout {
         record::encode_page(0, settings, page).is_some()
     }
 
-    /// An erased flash with these settings (address and value of a register) as its configuration; `None` if they do
-    /// not fit into a page.
+    /// Returns an erased flash with these settings (address and value of a register) as its configuration; `None` if
+    /// they do not fit into a page.
     #[must_use]
     pub fn flash_with(&self, settings: &[(u16, u16)]) -> Option<Vec<u8>> {
         let mut flash = vec![0xFF; self.part.flash_size];

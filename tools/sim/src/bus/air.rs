@@ -7,8 +7,8 @@ use crate::radio::{Air, Mode, News, tell, timing};
 use f103::time::Time;
 
 impl Air {
-    /// The air of these boards, from `now` on; `None` if no board has a module. The modules of the boards leave the air
-    /// that they had while they were alone.
+    /// Returns the air of these boards, from `now` on; `None` if no board has a module. The modules of the boards leave
+    /// the air that they had while they were alone.
     pub(super) fn of_boards(boards: &mut [Board], now: Time) -> Option<Self> {
         let mut air: Option<Self> = None;
         for (n, board) in (0..).zip(boards) {
@@ -25,7 +25,7 @@ impl Air {
         air
     }
 
-    /// The next actions of the gateway, as those of a board.
+    /// Returns the next actions of the gateway, as those of a board.
     pub(super) fn plan(&self) -> Plan {
         let awake = self.next_event().unwrap_or(Time::MAX);
         Plan {
@@ -37,7 +37,7 @@ impl Air {
 }
 
 impl Bus {
-    /// The air with the gateway radio; `None` if no board has a LoRa module.
+    /// Returns the air with the gateway radio; `None` if no board has a LoRa module.
     pub fn air(&mut self) -> Option<&mut Air> {
         let now = self.now();
         match &mut *self.boards {

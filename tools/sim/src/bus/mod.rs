@@ -12,8 +12,8 @@
 //! edges of a character are known when it begins.
 //!
 //! The LoRa modules of the boards and the gateway radio share the air. A receiver checks a packet some time after its
-//! end, and by then every module has passed the end of the packet. So a board with a module may be ahead of the others by
-//! that time, and the air is exact without any exception.
+//! end, and by then every module has passed the end of the packet. So a board with a module may be ahead of the others
+//! by that time, and the air is exact without any exception.
 //!
 //! The line is exact, with two exceptions:
 //!
@@ -63,7 +63,7 @@ pub struct Bus {
 }
 
 impl Bus {
-    /// A bus with these boards on it. Boards whose time is behind that of the others run first.
+    /// Returns a bus with these boards on it. Boards whose time is behind that of the others run first.
     ///
     /// # Panics
     ///
@@ -90,14 +90,14 @@ impl Bus {
         }
     }
 
-    /// Number of boards, at least 1.
+    /// Returns the number of boards, at least 1.
     #[must_use]
     #[expect(clippy::len_without_is_empty, reason = "a bus is never empty")]
     pub fn len(&self) -> usize {
         self.boards.len()
     }
 
-    /// The boards, in the order in which they were given.
+    /// Returns the boards, in the order in which they were given.
     #[must_use]
     pub fn boards(&self) -> &[Board] {
         &self.boards
@@ -124,7 +124,7 @@ impl Bus {
         &mut self.boards[n]
     }
 
-    /// The virtual time of the board that is farthest ahead.
+    /// Returns the virtual time of the board that is farthest ahead.
     #[must_use]
     pub fn now(&self) -> Time {
         let now = self.boards.iter().map(|board| board.now()).max();
@@ -169,7 +169,7 @@ impl Bus {
         self.board_mut(n).power_on();
     }
 
-    /// The line, for sending and for reading the record.
+    /// Returns the line, for sending and for reading the record.
     pub fn line(&mut self) -> &mut Line {
         let now = self.now();
         match &mut *self.boards {
@@ -181,7 +181,8 @@ impl Bus {
         }
     }
 
-    /// How far the boards, and the gateway after them, can run towards `t`. `None` if all of them sleep until `t`.
+    /// Returns how far the boards, and the gateway after them, can run towards `t`. `None` if all of them sleep until
+    /// `t`.
     fn horizon(&self, t: Time) -> Option<Horizon> {
         let gateway = self.air.as_ref().map(Air::plan);
         Horizon::of(self.plans.iter().copied().chain(gateway), t)
@@ -284,7 +285,7 @@ impl Board {
         self.sync();
     }
 
-    /// The rate and format of the unit, for a master that follows it; `None` while the power is off.
+    /// Returns the rate and format of the unit, for a master that follows it; `None` while the power is off.
     fn line_settings(&self) -> Option<Settings> {
         let usart = self.usart1();
         self.powered().then(|| usart.settings()).flatten()

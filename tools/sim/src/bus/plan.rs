@@ -33,7 +33,7 @@ pub(super) struct Horizon {
 }
 
 impl Horizon {
-    /// The horizon of boards with these plans. `None` if all boards sleep until `t`, the end of the run.
+    /// Returns the horizon of boards with these plans. `None` if all boards sleep until `t`, the end of the run.
     pub(super) fn of(plans: impl Iterator<Item = Plan> + Clone, t: Time) -> Option<Self> {
         let awake = plans.clone().map(|plan| plan.awake).min()?;
         if awake >= t {
@@ -58,7 +58,7 @@ impl Horizon {
         Some(horizon)
     }
 
-    /// Instant up to which board `n` runs.
+    /// Returns the instant up to which board `n` runs.
     pub(super) fn of_board(self, n: usize) -> Time {
         if n == self.first {
             self.next
@@ -69,7 +69,7 @@ impl Horizon {
 }
 
 impl Board {
-    /// The next actions of the board.
+    /// Returns the next actions of the board.
     pub(super) fn plan(&self) -> Plan {
         let awake = self.next_instruction();
         let usart = self.usart1();

@@ -111,18 +111,18 @@ impl Record {
         }
     }
 
-    /// The complete frames that are kept, oldest first.
+    /// Returns the complete frames that are kept, oldest first.
     pub fn frames(&self) -> impl DoubleEndedIterator<Item = &Frame> {
         self.kept.iter()
     }
 
-    /// The complete frames that are kept and have numbers above `number`, oldest first.
+    /// Returns the complete frames that are kept and have numbers above `number`, oldest first.
     pub fn since(&self, number: u64) -> impl Iterator<Item = &Frame> {
         let skip = self.kept.partition_point(|frame| frame.number <= number);
         self.kept.range(skip..)
     }
 
-    /// Number of frames so far: from the master, and from units.
+    /// Returns the number of frames so far: from the master, and from units.
     #[must_use]
     pub fn counts(&self) -> (u64, u64) {
         (self.from_master, self.from_unit)

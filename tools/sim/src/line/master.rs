@@ -26,7 +26,7 @@ pub struct Received {
 }
 
 impl Received {
-    /// Whether the character has no error.
+    /// Returns whether the character has no error.
     #[must_use]
     pub const fn is_good(&self) -> bool {
         !(self.parity_error || self.framing_error || self.noise || self.collided)
@@ -110,14 +110,14 @@ impl Line {
         }
     }
 
-    /// Instant at which the master has sent everything that is queued; now if that is in the past.
+    /// Returns the instant at which the master has sent everything that is queued; now if that is in the past.
     #[must_use]
     pub fn master_free(&self) -> Time {
         self.master.queued_until.max(self.earliest())
     }
 
-    /// The characters that the master has received from units, oldest first: the last 65 536, or all if everything is
-    /// kept. The master does not receive its own characters.
+    /// Returns the characters that the master has received from units, oldest first: the last 65 536, or all if
+    /// everything is kept. The master does not receive its own characters.
     pub fn received(&self) -> impl DoubleEndedIterator<Item = &Received> {
         self.received.iter()
     }

@@ -87,7 +87,7 @@ pub struct Line {
 }
 
 impl Default for Line {
-    /// An idle bus with a master at 9600 8N2.
+    /// Returns an idle bus with a master at 9600 8N2.
     fn default() -> Self {
         Self {
             settings: Settings::default(),
@@ -117,7 +117,7 @@ impl Default for Line {
 }
 
 impl Line {
-    /// Rate and format of the master. The record receives with them, too.
+    /// Returns the rate and format of the master. The record receives with them, too.
     #[must_use]
     pub const fn settings(&self) -> Settings {
         self.settings
@@ -141,24 +141,24 @@ impl Line {
         self.record.set_keep_all(all);
     }
 
-    /// The complete frames that are kept, oldest first.
+    /// Returns the complete frames that are kept, oldest first.
     pub fn frames(&self) -> impl DoubleEndedIterator<Item = &Frame> {
         self.record.frames()
     }
 
-    /// The complete frames that are kept and have numbers above `number`, oldest first.
+    /// Returns the complete frames that are kept and have numbers above `number`, oldest first.
     pub fn frames_since(&self, number: u64) -> impl Iterator<Item = &Frame> {
         self.record.since(number)
     }
 
-    /// Number of frames so far: from the master, and from units.
+    /// Returns the number of frames so far: from the master, and from units.
     #[must_use]
     pub fn frame_counts(&self) -> (u64, u64) {
         self.record.counts()
     }
 
-    /// Instants at which the unit's driver was switched, and whether it was on afterwards. On a bus with several units:
-    /// whether the driver of any unit was on afterwards.
+    /// Returns the instants at which the unit's driver was switched, and whether it was on afterwards. On a bus with
+    /// several units: whether the driver of any unit was on afterwards.
     pub fn driver_edges(&self) -> impl DoubleEndedIterator<Item = (Time, bool)> + '_ {
         self.driver_edges.iter().copied()
     }
@@ -169,7 +169,7 @@ impl Line {
         self.collisions.iter().copied()
     }
 
-    /// Level of the bus at `at`, which must be between [`HISTORY`] ago and now.
+    /// Returns the level of the bus at `at`, which must be between [`HISTORY`] ago and now.
     #[must_use]
     pub fn level_at(&self, at: Time) -> bool {
         self.bus.level_at(at)
@@ -189,7 +189,7 @@ impl Line {
         std::mem::take(&mut self.findings)
     }
 
-    /// Instant up to which the line is computed.
+    /// Returns the instant up to which the line is computed.
     #[must_use]
     pub const fn now(&self) -> Time {
         self.now

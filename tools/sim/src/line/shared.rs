@@ -85,17 +85,17 @@ impl Shared {
         }
     }
 
-    /// The levels that the other units put on the bus.
+    /// Returns the levels that the other units put on the bus.
     pub(super) fn waves(&self) -> impl Iterator<Item = &Wave> {
         self.others.iter().map(|sender| &sender.wave)
     }
 
-    /// Level of all other units together at `at`: low if one of them pulls the bus low.
+    /// Returns the level of all other units together at `at`: low if one of them pulls the bus low.
     pub(super) fn level_at(&self, at: Time) -> bool {
         self.waves().all(|wave| wave.level_at(at))
     }
 
-    /// Number of other units that pulled the bus low between two instants.
+    /// Returns the number of other units that pulled the bus low between two instants.
     pub(super) fn senders(&self, from: Time, to: Time) -> usize {
         self.waves()
             .filter(|wave| wave.low_between(from, to))
@@ -129,7 +129,7 @@ impl Shared {
 }
 
 impl Line {
-    /// The line that is the bus of several units, from `now` on.
+    /// Returns the line that is the bus of several units, from `now` on.
     pub(crate) fn of_bus(now: Time) -> Self {
         let mut line = Self {
             now,
@@ -149,7 +149,7 @@ impl Line {
         }
     }
 
-    /// Whether the unit at this end has changed its output since [`Line::take_output`].
+    /// Returns whether the unit at this end has changed its output since [`Line::take_output`].
     pub(crate) fn has_changed(&self) -> bool {
         self.shared.changed
     }
@@ -198,7 +198,7 @@ impl Line {
         }
     }
 
-    /// Whether nothing has happened at this end from `at` on.
+    /// Returns whether nothing has happened at this end from `at` on.
     fn unchanged_since(&self, at: Time) -> bool {
         let edges = [&self.bus, &self.unit].map(|wave| wave.previous_edge(Time::MAX));
         let switch = self.driver_edges.back().map(|&(at, _)| at);
@@ -232,7 +232,7 @@ impl Line {
         self.shared.earliest = earliest;
     }
 
-    /// The earliest instant at which something can be queued.
+    /// Returns the earliest instant at which something can be queued.
     pub(super) fn earliest(&self) -> Time {
         self.shared.earliest.max(self.now)
     }

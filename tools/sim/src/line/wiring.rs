@@ -49,12 +49,12 @@ impl Wire for Line {
             .min()
     }
 
-    /// Whether an edge of the RX pin waits for the USART.
+    /// Returns whether an edge of the RX pin waits for the USART.
     fn has_edges(&self) -> bool {
         !self.rx_edges.is_empty()
     }
 
-    /// Level of the receiver's output; high while the receiver is off.
+    /// Returns the level of the receiver's output; high while the receiver is off.
     fn rx_level(&self) -> bool {
         self.rx
     }
@@ -111,7 +111,7 @@ impl Line {
         self.settle(self.now);
     }
 
-    /// Whether the unit's driver is on.
+    /// Returns whether the unit's driver is on.
     #[must_use]
     pub const fn driver(&self) -> bool {
         self.driver

@@ -57,8 +57,8 @@ pub struct Options {
     #[arg(long, value_name = "NAME", default_value = "nominal")]
     pub corner: Corner,
 
-    /// Store the modules of all slots in the configuration, and with --lora that the radio is on, if nothing is stored yet
-    /// (default)
+    /// Store the modules of all slots in the configuration, and with --lora that the radio is on, if nothing is stored
+    /// yet (default)
     #[arg(long, overrides_with = "no_preset")]
     preset: bool,
 
@@ -91,8 +91,8 @@ pub struct Options {
     #[arg(long, value_name = "ADDR", value_parser = address, conflicts_with_all = ["pty", "tcp", "modbus_tcp", "gdb", "lora"])]
     pub exact_line: Option<SocketAddr>,
 
-    /// Fit a LoRa module to every board, and make LINK a symlink to a second pseudo-terminal: the serial side, 9600 8N1,
-    /// of a gateway radio on the same air
+    /// Fit a LoRa module to every board, and make LINK a symlink to a second pseudo-terminal: the serial side, 9600
+    /// 8N1, of a gateway radio on the same air
     #[arg(long, value_name = "LINK")]
     pub lora: Option<PathBuf>,
 
@@ -133,7 +133,7 @@ pub struct Options {
 }
 
 impl Options {
-    /// Whether to store the modules of all slots in the configuration if nothing is stored yet.
+    /// Returns whether to store the modules of all slots in the configuration if nothing is stored yet.
     #[must_use]
     pub fn preset(&self) -> bool {
         !self.no_preset

@@ -7,7 +7,8 @@ impl Options {
     ///
     /// # Errors
     ///
-    /// In one line: the options to use on a system without pseudo-terminals, or two pseudo-terminals with the same link.
+    /// In one line: the options to use on a system without pseudo-terminals, or two pseudo-terminals with the same
+    /// link.
     pub fn check_line(&self) -> Result<(), String> {
         if self.pty.is_some() && self.pty == self.lora {
             return Err("--pty and --lora need different links".to_owned());

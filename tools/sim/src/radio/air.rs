@@ -75,7 +75,7 @@ impl Air {
         self.queued_until
     }
 
-    /// The bytes that the gateway has sent at its UART, oldest first: the last 65 536.
+    /// Returns the bytes that the gateway has sent at its UART, oldest first: the last 65 536.
     pub fn received(&self) -> impl DoubleEndedIterator<Item = &Byte> {
         self.received.iter()
     }
@@ -104,13 +104,13 @@ impl Air {
         packet
     }
 
-    /// The packets on the air, in the order in which they became known: the last 65 536. A packet whose transmitter loses
-    /// its power ends at that instant.
+    /// Returns the packets on the air, in the order in which they became known: the last 65 536. A packet whose
+    /// transmitter loses its power ends at that instant.
     pub fn packets(&self) -> impl DoubleEndedIterator<Item = &Packet> {
         self.packets.iter()
     }
 
-    /// The gateway radio.
+    /// Returns the gateway radio.
     #[must_use]
     pub const fn gateway(&self) -> &Module {
         &self.gateway
@@ -133,13 +133,13 @@ impl Air {
         self.loss = loss;
     }
 
-    /// The probability that a receiver loses a packet.
+    /// Returns the probability that a receiver loses a packet.
     #[must_use]
     pub const fn loss(&self) -> f64 {
         self.loss
     }
 
-    /// The earliest instant at which something can begin.
+    /// Returns the earliest instant at which something can begin.
     #[must_use]
     pub fn now(&self) -> Time {
         self.earliest.max(self.gateway.now())
@@ -150,7 +150,7 @@ impl Air {
         self.earliest = earliest;
     }
 
-    /// Instant of the next event; never before the present of the gateway.
+    /// Returns the instant of the next event; never before the present of the gateway.
     pub(crate) fn next_event(&self) -> Option<Time> {
         let tune = self.tune.filter(|_| self.gateway.is_idle());
         let tune = tune.map(|(at, _)| at.max(self.gateway.now()));
@@ -225,7 +225,7 @@ impl Air {
         core::mem::take(&mut self.news)
     }
 
-    /// Whether there is news for the boards.
+    /// Returns whether there is news for the boards.
     pub(crate) fn has_news(&self) -> bool {
         !self.news.is_empty()
     }

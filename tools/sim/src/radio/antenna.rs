@@ -37,7 +37,7 @@ pub(super) struct Antenna {
 }
 
 impl Antenna {
-    /// An antenna of a radio that is off.
+    /// Returns an antenna of a radio that is off.
     pub(super) const fn off() -> Self {
         Self {
             signals: Vec::new(),
@@ -78,7 +78,7 @@ impl Antenna {
         }
     }
 
-    /// Instant at which the next packet is checked.
+    /// Returns the instant at which the next packet is checked.
     pub(super) fn next_event(&self) -> Option<Time> {
         let open = self.signals.iter().filter(|signal| !signal.decided);
         open.map(Signal::checked).min()
@@ -151,8 +151,8 @@ impl Antenna {
     }
 }
 
-/// A random number from 0 to 1 that depends only on the packet and its receiver, so that the order of the packets does
-/// not matter.
+/// Returns a random number from 0 to 1 that depends only on the packet and its receiver, so that the order of the
+/// packets does not matter.
 fn lot(packet: &Packet, receiver: Sender) -> f64 {
     let who = packet.sender.code() << 20 | receiver.code();
     Rng::with_seed(SEED ^ who << 24 ^ packet.number).f64()

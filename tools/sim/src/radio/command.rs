@@ -34,7 +34,7 @@ pub(super) enum Command {
 }
 
 impl Command {
-    /// The command that these bytes are, all of them.
+    /// Returns the command that these bytes are, all of them.
     pub(super) fn of(bytes: &[u8]) -> Option<Self> {
         match *bytes {
             [head @ (STORED | TEMPORARY), a, b, c, d, e] => Some(Self::Set {
@@ -48,7 +48,7 @@ impl Command {
         }
     }
 
-    /// Time from the end of the command to its answer, or to the reset.
+    /// Returns the time from the end of the command to its answer, or to the reset.
     pub(super) fn duration(self) -> Time {
         match self {
             Self::Set { kept: true, .. } => timing::STORE,
@@ -68,7 +68,7 @@ pub(super) struct Memory {
 }
 
 impl Memory {
-    /// A memory with these parameters stored and in force.
+    /// Returns a memory with these parameters stored and in force.
     pub(super) const fn new(stored: Parameters) -> Self {
         Self {
             stored,
@@ -102,7 +102,7 @@ impl Memory {
         }
     }
 
-    /// The parameters in force, as the module answers them.
+    /// Returns the parameters in force, as the module answers them.
     fn answer(&self) -> Vec<u8> {
         let head = if self.temporary { TEMPORARY } else { STORED };
         [&[head][..], &self.in_force.bytes()].concat()

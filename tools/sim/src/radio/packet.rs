@@ -16,7 +16,7 @@ pub enum Sender {
 }
 
 impl Sender {
-    /// A number that no other sender has.
+    /// Returns a number that no other sender has.
     pub(super) const fn code(self) -> u64 {
         match self {
             Self::Board(n) => n as u64,
@@ -46,7 +46,7 @@ pub struct Packet {
 }
 
 impl Packet {
-    /// A packet that begins at `start`, at a corner of the transmitter.
+    /// Returns a packet that begins at `start`, at a corner of the transmitter.
     pub(super) fn new(
         corner: Corner,
         sender: Sender,
@@ -68,12 +68,12 @@ impl Packet {
         }
     }
 
-    /// Whether this is packet `number` of `sender`.
+    /// Returns whether this is packet `number` of `sender`.
     pub(super) fn is(&self, sender: Sender, number: u64) -> bool {
         self.sender == sender && self.number == number
     }
 
-    /// Whether both packets are on the same channel at the same time, so that they destroy each other.
+    /// Returns whether both packets are on the same channel at the same time, so that they destroy each other.
     #[must_use]
     pub fn collides_with(&self, other: &Self) -> bool {
         !self.is(other.sender, other.number)

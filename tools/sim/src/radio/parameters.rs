@@ -17,7 +17,7 @@ pub enum Mode {
 }
 
 impl Mode {
-    /// The mode of these levels at M0 and M1.
+    /// Returns the mode of these levels at M0 and M1.
     #[must_use]
     pub const fn of_pins(m0: bool, m1: bool) -> Self {
         match (m0, m1) {
@@ -28,7 +28,7 @@ impl Mode {
         }
     }
 
-    /// Name of the mode in the HTTP interface.
+    /// Returns the name of the mode in the HTTP interface.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -39,7 +39,7 @@ impl Mode {
         }
     }
 
-    /// Whether bytes at the UART are sent over the air.
+    /// Returns whether bytes at the UART are sent over the air.
     #[must_use]
     pub const fn sends(self) -> bool {
         matches!(self, Self::Normal | Self::WakeUp)
@@ -70,53 +70,53 @@ impl Parameters {
     /// Address that receives from all addresses of its channel, and sends to all of them.
     pub const EVERY_ADDRESS: u16 = 0xFFFF;
 
-    /// The parameters with these bytes. Bits 7 to 5 of CHAN are reserved and become 0.
+    /// Returns the parameters with these bytes. Bits 7 to 5 of CHAN are reserved and become 0.
     #[must_use]
     pub const fn from_bytes(bytes: [u8; 5]) -> Self {
         let [high, low, sped, channel, option] = bytes;
         Self([high, low, sped, channel & 0x1F, option])
     }
 
-    /// The five bytes, as in the commands C0 and C2.
+    /// Returns the five bytes, as in the commands C0 and C2.
     #[must_use]
     pub const fn bytes(self) -> [u8; 5] {
         self.0
     }
 
-    /// The same parameters with another address.
+    /// Returns the same parameters with another address.
     #[must_use]
     pub const fn with_address(mut self, address: u16) -> Self {
         [self.0[0], self.0[1]] = address.to_be_bytes();
         self
     }
 
-    /// The same parameters with another channel, 0 to 31. Higher bits are ignored.
+    /// Returns the same parameters with another channel, 0 to 31. Higher bits are ignored.
     #[must_use]
     pub const fn with_channel(mut self, channel: u8) -> Self {
         self.0[3] = channel & 0x1F;
         self
     }
 
-    /// The same parameters with another code of the air rate: bits 2 to 0 of SPED. Higher bits are ignored.
+    /// Returns the same parameters with another code of the air rate: bits 2 to 0 of SPED. Higher bits are ignored.
     #[must_use]
     pub const fn with_air_rate_code(mut self, code: u8) -> Self {
         self.0[2] = self.0[2] & !7 | code & 7;
         self
     }
 
-    /// The same parameters, with the UART at 9600 8N1.
+    /// Returns the same parameters, with the UART at 9600 8N1.
     pub(super) const fn with_default_uart(mut self) -> Self {
         self.0[2] = self.0[2] & 7 | 0x18;
         self
     }
 
-    /// The address.
+    /// Returns the address.
     #[must_use]
     pub const fn address(self) -> u16 {
         u16::from_be_bytes([self.0[0], self.0[1]])
     }
 
-    /// Rate and format of the UART outside sleep.
+    /// Returns the rate and format of the UART outside sleep.
     #[must_use]
     pub const fn uart(self) -> Settings {
         const BAUD: [u32; 8] = [1200, 2400, 4800, 9600, 19_200, 38_400, 57_600, 115_200];
@@ -130,7 +130,7 @@ impl Parameters {
         }
     }
 
-    /// The air rate in bit/s.
+    /// Returns the air rate in bit/s.
     #[must_use]
     pub const fn air_rate(self) -> u32 {
         match self.0[2] & 7 {
@@ -143,50 +143,51 @@ impl Parameters {
         }
     }
 
-    /// The channel, 0 to 31.
+    /// Returns the channel, 0 to 31.
     #[must_use]
     pub const fn channel(self) -> u8 {
         self.0[3]
     }
 
-    /// Frequency of the channel in MHz, 410 to 441.
+    /// Returns the frequency of the channel in MHz, 410 to 441.
     #[must_use]
     pub const fn frequency_mhz(self) -> u16 {
         410 + self.0[3] as u16
     }
 
-    /// Whether fixed transmission is on: the first bytes at the UART are then the address and channel of the receiver.
+    /// Returns whether fixed transmission is on: the first bytes at the UART are then the address and channel of the
+    /// receiver.
     #[must_use]
     pub const fn fixed_transmission(self) -> bool {
         self.0[4] & 0x80 != 0
     }
 
-    /// Whether TXD and AUX are push-pull outputs. Otherwise they are open-drain outputs.
+    /// Returns whether TXD and AUX are push-pull outputs. Otherwise they are open-drain outputs.
     #[must_use]
     pub const fn push_pull(self) -> bool {
         self.0[4] & 0x40 != 0
     }
 
-    /// Duration of the wake-up preamble, 250 ms to 2 s.
+    /// Returns the duration of the wake-up preamble, 250 ms to 2 s.
     #[must_use]
     pub const fn wake_up(self) -> Time {
         Time::from_ms(250 * (1 + (self.0[4] >> 3 & 7) as u64))
     }
 
-    /// Whether forward error correction is on.
+    /// Returns whether forward error correction is on.
     #[must_use]
     pub const fn fec(self) -> bool {
         self.0[4] & 4 != 0
     }
 
-    /// The power in dBm: 20, 17, 14 or 10.
+    /// Returns the power in dBm: 20, 17, 14 or 10.
     #[must_use]
     pub const fn power_dbm(self) -> u8 {
         [20, 17, 14, 10][(self.0[4] & 3) as usize]
     }
 
-    /// Whether a module with these parameters receives the packets of a module with `sender`'s: channel, air rate, FEC
-    /// and address are the same. [`Parameters::EVERY_ADDRESS`] matches every address.
+    /// Returns whether a module with these parameters receives the packets of a module with `sender`'s: channel, air
+    /// rate, FEC and address are the same. [`Parameters::EVERY_ADDRESS`] matches every address.
     #[must_use]
     pub const fn receive(self, sender: Self) -> bool {
         let same_address = self.address() == sender.address()

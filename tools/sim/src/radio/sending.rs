@@ -21,7 +21,7 @@ pub(super) struct Sending {
 }
 
 impl Sending {
-    /// Number of bytes that were lost because the buffer was full.
+    /// Returns the number of bytes that were lost because the buffer was full.
     pub(super) const fn lost(&self) -> u64 {
         self.lost
     }
@@ -36,17 +36,17 @@ impl Sending {
         }
     }
 
-    /// Whether all bytes are in packets that have begun.
+    /// Returns whether all bytes are in packets that have begun.
     pub(super) fn is_empty(&self) -> bool {
         self.buffer.is_empty()
     }
 
-    /// Whether a packet is being sent.
+    /// Returns whether a packet is being sent.
     pub(super) const fn is_on_air(&self) -> bool {
         self.on_air.is_some()
     }
 
-    /// Instant at which a packet ends or begins. `idle` says that no character is being received.
+    /// Returns the instant at which a packet ends or begins. `idle` says that no character is being received.
     pub(super) fn next_event(&self, idle: bool) -> Option<Time> {
         if self.on_air.is_some() {
             return self.on_air;

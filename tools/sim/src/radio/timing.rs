@@ -52,8 +52,8 @@ pub const CHECK: Time = Time::from_ms(2);
 /// manual).
 pub const OUTPUT_DELAY: Time = Time::from_ms(5);
 
-/// Duration of a packet with `bytes` bytes at an air rate of `rate` bit/s, without a wake-up preamble. Assumption: all
-/// bits are sent at the nominal rate, or at half of it at the slow corner.
+/// Returns the duration of a packet with `bytes` bytes at an air rate of `rate` bit/s, without a wake-up preamble.
+/// Assumption: all bits are sent at the nominal rate, or at half of it at the slow corner.
 #[must_use]
 pub const fn packet(bytes: usize, rate: u32, corner: Corner) -> Time {
     let bits = OVERHEAD_BITS + 8 * bytes as u64;

@@ -58,7 +58,7 @@ impl Default for Uart {
 }
 
 impl Uart {
-    /// Duration of `n` bytes.
+    /// Returns the duration of `n` bytes.
     pub(super) fn bytes(&self, n: u64) -> Time {
         self.settings.characters(n)
     }
@@ -126,12 +126,12 @@ impl Uart {
         })
     }
 
-    /// Whether no character is being received.
+    /// Returns whether no character is being received.
     pub(super) fn is_idle(&self) -> bool {
         self.receiver.is_idle()
     }
 
-    /// Instant at which a character begins or is complete.
+    /// Returns the instant at which a character begins or is complete.
     pub(super) fn next_event(&self) -> Option<Time> {
         if !self.open {
             return None;
@@ -161,7 +161,7 @@ impl Uart {
         self.sent_until
     }
 
-    /// Number of bytes at TXD that do not begin before `now`.
+    /// Returns the number of bytes at TXD that do not begin before `now`.
     pub(super) fn waiting(&self, now: Time) -> usize {
         let waiting = self.sent.iter().rev();
         waiting.take_while(|byte| byte.start >= now).count()
@@ -183,12 +183,12 @@ impl Uart {
         self.sent.drain(..count).collect()
     }
 
-    /// Level at TXD.
+    /// Returns the level at TXD.
     pub(crate) fn txd(&self, now: Time) -> bool {
         self.txd.level_at(now)
     }
 
-    /// The next edge at TXD after the edges that were taken.
+    /// Returns the next edge at TXD after the edges that were taken.
     pub(crate) fn next_edge(&self) -> Option<Time> {
         self.txd.next_edge(self.taken).map(|(at, _)| at)
     }

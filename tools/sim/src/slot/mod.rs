@@ -75,7 +75,7 @@ impl Default for Slot {
 }
 
 impl Slot {
-    /// A slot with `module` in it, with its power on and nothing applied to its inputs.
+    /// Returns a slot with `module` in it, with its power on and nothing applied to its inputs.
     #[must_use]
     pub fn new(module: Module) -> Self {
         Self {
@@ -93,7 +93,7 @@ impl Slot {
         }
     }
 
-    /// The same slot, with the DAC of its modules at the I2C address `address`, 0x60 to 0x67.
+    /// Returns the same slot, with the DAC of its modules at the I2C address `address`, 0x60 to 0x67.
     #[must_use]
     pub fn with_dac_at(self, address: u8) -> Self {
         Self {
@@ -103,7 +103,7 @@ impl Slot {
         }
     }
 
-    /// The module in the slot.
+    /// Returns the module in the slot.
     #[must_use]
     pub const fn module(&self) -> Module {
         self.module
@@ -129,7 +129,7 @@ impl Slot {
         self.powered = on;
     }
 
-    /// State of channel `ch` (1 to 4); [`Channel::None`] for any other number.
+    /// Returns the state of channel `ch` (1 to 4); [`Channel::None`] for any other number.
     #[must_use]
     pub fn channel(&self, ch: usize) -> Channel {
         if !(1..=4).contains(&ch) {
@@ -213,14 +213,14 @@ impl Slot {
         Ok(())
     }
 
-    /// Source impedance at line `line` (1 to 4), in ohms.
+    /// Returns the source impedance at line `line` (1 to 4), in ohms.
     #[must_use]
     pub fn source_ohms(&self, line: usize) -> u32 {
         let ohms = line.checked_sub(1).and_then(|n| self.source_ohms.get(n));
         ohms.copied().unwrap_or(SOURCE_OHMS)
     }
 
-    /// What the module drives at line `line` (1 to 4).
+    /// Returns what the module drives at line `line` (1 to 4).
     #[must_use]
     pub fn drive(&self, line: usize) -> Drive {
         let pulls = |low| if low { Drive::Low } else { Drive::Floating };
@@ -240,13 +240,13 @@ impl Slot {
         }
     }
 
-    /// Whether the module has a DAC on I2C1.
+    /// Returns whether the module has a DAC on I2C1.
     #[must_use]
     pub fn has_dac(&self) -> bool {
         self.module.points().contains(&Kind::WordOutput)
     }
 
-    /// The four input registers of the DAC, and the four settings in its EEPROM, A to D.
+    /// Returns the four input registers of the DAC, and the four settings in its EEPROM, A to D.
     #[must_use]
     pub const fn dac(&self) -> ([Setting; 4], [Setting; 4]) {
         (self.dac.registers(), self.dac.eeprom())
@@ -257,7 +257,7 @@ impl Slot {
         self.fault = fault;
     }
 
-    /// The fault of the DAC or of the I2C wires.
+    /// Returns the fault of the DAC or of the I2C wires.
     #[must_use]
     pub const fn bus_fault(&self) -> BusFault {
         self.fault
@@ -284,7 +284,7 @@ impl Slot {
         true
     }
 
-    /// Levels of the I2C wires as the devices hold them, without the part's own outputs.
+    /// Returns the levels of the I2C wires as the devices hold them, without the part's own outputs.
     #[must_use]
     pub fn held(&self) -> Wires {
         Wires {

@@ -258,9 +258,9 @@ impl Bench {
         Time::from_ps(self.characters(1).as_ps() / 10_000) + Time::from_ns(80)
     }
 
-    /// Sends a request after `rest`. Returns the bytes of the reply and the time from t3.5 until the driver was on. Asserts
-    /// that a reply begins within 60 ms, and that the driver is off in time after it. Afterwards the unit must be ready,
-    /// and a master may send its next request now.
+    /// Sends a request after `rest`. Returns the bytes of the reply and the time from t3.5 until the driver was on.
+    /// Asserts that a reply begins within 60 ms, and that the driver is off in time after it. Afterwards the unit must
+    /// be ready, and a master may send its next request now.
     pub fn hurry(&mut self, rest: Time, bytes: &[u8]) -> (Vec<u8>, Time) {
         let start = self.board.now() + rest;
         self.sent = self.board.line().send(start, bytes);

@@ -128,8 +128,8 @@ fn a_unit_replies_the_same_with_and_without_other_units() {
         let mut bus = bus(dips.iter().copied());
         let mut at = bus.now();
         for _ in 0..5 {
-            // A bus stops after the instruction that passes the time, which may be another one with more boards. A request
-            // that was sent "now" would not begin at the same time.
+            // A bus stops after the instruction that passes the time, which may be another one with more boards. A
+            // request that was sent "now" would not begin at the same time.
             at += Time::from_ms(60);
             bus.line().send(at, &adu(&[1, 2, 0, FIRST, 0, 4]));
             bus.run_until(at + Time::from_ms(59));

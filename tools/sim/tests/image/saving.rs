@@ -1,5 +1,5 @@
-//! Saving while the line is busy: at 115200 bit/s, with each request as soon after the last reply as a master may send it,
-//! no request is lost, and the driver is off in time.
+//! Saving while the line is busy: at 115200 bit/s, with each request as soon after the last reply as a master may send
+//! it, no request is lost, and the driver is off in time.
 
 use register_map::{codes::Baud, configuration, fault};
 use sim::{Corner, Module, Time, periph::flash::Durations, soc::map::Block};

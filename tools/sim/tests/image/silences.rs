@@ -1,5 +1,5 @@
-//! Silences inside a reply. A reply is complete before its first byte is sent, so only a late interrupt can separate two
-//! of its characters.
+//! Silences inside a reply. A reply is complete before its first byte is sent, so only a late interrupt can separate
+//! two of its characters.
 
 use register_map::{
     codes::Baud,

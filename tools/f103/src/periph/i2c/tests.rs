@@ -104,7 +104,7 @@ impl Bench {
         self.write(offset::CR1, cr1 & !bits);
     }
 
-    /// Returns the waits for one of `flags` in SR1, event by event; `false` when there is no further event.
+    /// Waits for one of `flags` in SR1, event by event; `false` when there is no further event.
     fn wait(&mut self, flags: u32) -> bool {
         while self.read(offset::SR1) & flags == 0 {
             match self.i2c.next_event() {

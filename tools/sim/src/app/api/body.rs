@@ -74,7 +74,7 @@ impl<'de> Visitor<'de> for Entries {
     }
 }
 
-/// The JSON object in the body of a POST.
+/// Returns the JSON object in the body of a POST.
 fn body(request: &Request) -> Result<Body, Reply> {
     if request.method != "POST" {
         return Err(Reply::error(405, "this path accepts POST only"));

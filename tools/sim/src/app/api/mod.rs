@@ -174,7 +174,8 @@ fn get_frames(bench: &mut Bench, query: &str) -> Outcome {
     Ok(json(&frames::since(bench.bus.line(), since(query)?)))
 }
 
-/// The boards on the line. Every other path also exists as `/api/boards/{name}/...`; without `boards/{name}` it means the first board
+/// The boards on the line. Every other path also exists as `/api/boards/{name}/...`; without `boards/{name}` it means
+/// the first board
 #[utoipa::path(
     get,
     path = "/api/boards",

@@ -89,8 +89,8 @@ impl Exchange {
     }
 }
 
-/// Time after a request within which its reply must have been received. It consists of the time until the reply begins,
-/// the longest frame, and the silence that ends a frame.
+/// Returns the time after a request within which its reply must have been received. It consists of the time until the
+/// reply begins, the longest frame, and the silence that ends a frame.
 pub fn patience(framing: Framing, settings: Settings) -> Time {
     let longest = match framing {
         Framing::Ascii => ASCII_MOST,

@@ -68,7 +68,7 @@ impl Gateway {
         })
     }
 
-    /// The address of the gateway: with port 0 the system has chosen the port.
+    /// Returns the address of the gateway: with port 0 the system has chosen the port.
     pub fn address(&self) -> SocketAddr {
         self.address
     }

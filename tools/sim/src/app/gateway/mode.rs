@@ -32,7 +32,7 @@ impl Mode {
         self.stored = mode.unwrap_or_default();
     }
 
-    /// The framing of the line. A line with 7 data bits is in ASCII mode, because RTU needs 8 (V1.02, 2.5.1).
+    /// Returns the framing of the line. A line with 7 data bits is in ASCII mode, because RTU needs 8 (V1.02, 2.5.1).
     pub fn framing(&self, settings: Settings) -> Framing {
         let seven = settings.format.data_bits() == 7;
         let ascii = self.stored == codes::Mode::Ascii.code() && self.dip != RECOVERY;

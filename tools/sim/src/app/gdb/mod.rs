@@ -1,8 +1,8 @@
 //! The GDB server on the core (`--gdb`): one debugger at a time.
 //!
-//! A thread waits for a debugger and passes its bytes on, as fast as they are handled. The protocol (crate gdbstub) runs
-//! on the boards' thread: the session with the debugger in [`session`], its access to the board in [`target`]. While the
-//! debugger has halted the core, no virtual time passes.
+//! A thread waits for a debugger and passes its bytes on, as fast as they are handled. The protocol (crate gdbstub)
+//! runs on the boards' thread: the session with the debugger in [`session`], its access to the board in [`target`].
+//! While the debugger has halted the core, no virtual time passes.
 
 use std::io::Read;
 use std::net::{SocketAddr, TcpStream};
@@ -80,7 +80,7 @@ mod tests {
         (address, queue)
     }
 
-    /// The next message; waits for it.
+    /// Returns the next message; waits for it.
     fn next(queue: &Receiver<Event>) -> Message {
         match queue.recv_timeout(Duration::from_secs(60)) {
             Ok(Event::Gdb(message)) => message,

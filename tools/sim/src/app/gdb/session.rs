@@ -26,7 +26,7 @@ pub struct Session {
 }
 
 impl Session {
-    /// Whether the debugger has halted the core. Virtual time stands still then.
+    /// Returns whether the debugger has halted the core. Virtual time stands still then.
     pub fn halted(&self) -> bool {
         !matches!(self.machine, None | Some(GdbStubStateMachine::Running(_)))
     }

@@ -15,7 +15,7 @@ pub struct Guard {
 }
 
 impl Guard {
-    /// The guard of a server at this address.
+    /// Returns the guard of a server at this address.
     pub const fn new(address: SocketAddr) -> Self {
         Self {
             bound: address.ip(),

@@ -207,7 +207,8 @@ async fn not_get() -> api::Reply {
     api::Reply::error(405, "this path accepts GET only")
 }
 
-/// Server-sent events: `state` at the beginning and whenever it has changed, at most ten times a second; `frame` when a frame has ended; `lost`, with the number of missed events, when the client reads too slowly
+/// Server-sent events: `state` at the beginning and whenever it has changed, at most ten times a second; `frame` when a
+/// frame has ended; `lost`, with the number of missed events, when the client reads too slowly
 #[utoipa::path(
     get,
     path = "/api/events",

@@ -32,7 +32,7 @@ pub const FILES: [(&str, &str, &str); 14] = [
 /// Content security policy: the page loads nothing from other servers and has no script in its HTML.
 const POLICY: &str = "default-src 'self'; img-src data:; frame-ancestors 'none'";
 
-/// The routes of the page.
+/// Returns the routes of the page.
 pub fn routes<S: Clone + Send + Sync + 'static>() -> Router<S> {
     let modules = get(|| async { file(SCRIPT, modules()) });
     let modules = Router::new().route("/modules.js", modules.fallback(super::not_get));

@@ -13,7 +13,7 @@ fn server() -> (SocketAddr, broadcast::Sender<Note>) {
     server_with(connections::PATIENCE)
 }
 
-/// A server that closes a connection over which nothing can be sent for `patience`.
+/// Returns a server that closes a connection over which nothing can be sent for `patience`.
 fn server_with(patience: Duration) -> (SocketAddr, broadcast::Sender<Note>) {
     let (events, queue) = mpsc::channel();
     thread::spawn(move || {
@@ -37,7 +37,7 @@ fn ask(address: SocketAddr, request: &[u8]) -> String {
     answer
 }
 
-/// The answer to a valid request that changes nothing.
+/// Returns the answer to a valid request that changes nothing.
 fn read_state(address: SocketAddr) -> String {
     ask(
         address,

@@ -54,7 +54,7 @@ impl Scenario {
         })
     }
 
-    /// Time of the next step.
+    /// Returns the time of the next step.
     pub fn next(&self) -> Option<Time> {
         let due = self.due.first_key_value().map(|(&(at, _), _)| at);
         due.into_iter().chain(self.round).min()

@@ -49,7 +49,7 @@ pub struct Input {
 }
 
 impl Ramp {
-    /// Voltage at `now` in mV.
+    /// Returns the voltage at `now` in mV.
     pub fn at(&self, now: Time) -> u16 {
         let (begin, from) = self.begun.unwrap_or((now, self.to));
         let passed = now.saturating_sub(begin);

@@ -28,7 +28,7 @@ struct Bench {
 }
 
 impl Bench {
-    /// Both ends at 115200 8N2, after the first idle frame of the USART.
+    /// Returns both ends at 115200 8N2, after the first idle frame of the USART.
     fn new() -> Self {
         let mut bench = Self {
             line: Line::default(),

@@ -2,8 +2,8 @@
 
 use super::*;
 
-/// Time and value of the byte that another unit receives, and the same for the master. The other unit gets the edges
-/// `late` after the start bit.
+/// Returns the time and value of the byte that another unit receives, and the same for the master. The other unit gets
+/// the edges `late` after the start bit.
 fn received(byte: u8, late: Time) -> [Vec<(Time, u8)>; 2] {
     let (mut sender, mut listener) = (Bench::new(), Bench::new());
     let mut bus = Line::of_bus(TICK);

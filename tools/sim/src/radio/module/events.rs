@@ -12,7 +12,7 @@ use f103::time::Time;
 const LONGEST_COMMAND: usize = 6;
 
 impl Module {
-    /// Instant of the next event; never before the present.
+    /// Returns the instant of the next event; never before the present.
     pub(crate) fn next_event(&self) -> Option<Time> {
         if !self.works() {
             return None;
@@ -148,8 +148,8 @@ impl Module {
         self.news.push(News::Begun(packet));
     }
 
-    /// Instant at which the module takes over the mode of its pins. `None` if it is in force, or while the module is
-    /// busy.
+    /// Returns the instant at which the module takes over the mode of its pins. `None` if it is in force, or while the
+    /// module is busy.
     fn mode_change(&self) -> Option<Time> {
         let idle_since = self.idle_since?;
         let differs = self.mode.is_some_and(|mode| mode != self.wanted);

@@ -63,7 +63,7 @@ pub struct Module {
 }
 
 impl Module {
-    /// A module without power, which keeps `stored`. Its pins M0 and M1 are open, which is high.
+    /// Returns a module without power, which keeps `stored`. Its pins M0 and M1 are open, which is high.
     pub(crate) fn new(sender: Sender, stored: Parameters, corner: Corner) -> Self {
         Self {
             corner,
@@ -92,14 +92,14 @@ impl Module {
         }
     }
 
-    /// The mode in force. `None` while the module does not work: without power, during its start and reconfiguration,
-    /// or with a fault.
+    /// Returns the mode in force. `None` while the module does not work: without power, during its start and
+    /// reconfiguration, or with a fault.
     #[must_use]
     pub const fn mode(&self) -> Option<Mode> {
         self.mode
     }
 
-    /// Level of AUX as the module drives it: high when it is idle. Low without power.
+    /// Returns the level of AUX as the module drives it: high when it is idle. Low without power.
     #[must_use]
     pub fn aux(&self) -> bool {
         self.works()
@@ -109,37 +109,37 @@ impl Module {
             && self.uart.sent_until() <= self.now
     }
 
-    /// The parameters in force.
+    /// Returns the parameters in force.
     #[must_use]
     pub const fn parameters(&self) -> Parameters {
         self.memory.in_force
     }
 
-    /// The parameters that the module keeps without power.
+    /// Returns the parameters that the module keeps without power.
     #[must_use]
     pub const fn stored(&self) -> Parameters {
         self.memory.stored
     }
 
-    /// Number of packets that the module has begun to send.
+    /// Returns the number of packets that the module has begun to send.
     #[must_use]
     pub const fn packets_sent(&self) -> u64 {
         self.sent
     }
 
-    /// Number of packets that the module has received.
+    /// Returns the number of packets that the module has received.
     #[must_use]
     pub const fn packets_received(&self) -> u64 {
         self.received
     }
 
-    /// Number of bytes that were lost because one of the two buffers was full.
+    /// Returns the number of bytes that were lost because one of the two buffers was full.
     #[must_use]
     pub const fn bytes_lost(&self) -> u64 {
         self.sending.lost() + self.lost
     }
 
-    /// The fault of the module.
+    /// Returns the fault of the module.
     #[must_use]
     pub const fn fault(&self) -> Fault {
         self.fault
@@ -167,7 +167,7 @@ impl Module {
         self.confirmation = confirmation;
     }
 
-    /// How the module drives its pin AUX.
+    /// Returns how the module drives its pin AUX.
     #[must_use]
     pub fn drive_aux(&self) -> Drive {
         match (self.is_there(), self.aux()) {
@@ -178,12 +178,12 @@ impl Module {
         }
     }
 
-    /// Whether the module has power and is not absent.
+    /// Returns whether the module has power and is not absent.
     pub(crate) fn is_there(&self) -> bool {
         self.powered && self.fault != Fault::Absent
     }
 
-    /// Whether the module has power and no fault.
+    /// Returns whether the module has power and no fault.
     fn works(&self) -> bool {
         self.powered && self.fault == Fault::None
     }
@@ -228,7 +228,7 @@ impl Module {
         self.enter(Mode::Normal, self.now);
     }
 
-    /// Whether the module neither sends a packet nor has bytes on their way.
+    /// Returns whether the module neither sends a packet nor has bytes on their way.
     pub(super) fn is_idle(&self) -> bool {
         self.aux() && !self.sending.is_on_air() && self.collected.is_empty()
     }
@@ -278,17 +278,17 @@ impl Module {
         }
     }
 
-    /// The UART.
+    /// Returns the UART.
     pub(crate) const fn uart(&self) -> &Uart {
         &self.uart
     }
 
-    /// The UART, for the transmitter at RXD.
+    /// Returns the UART, for the transmitter at RXD.
     pub(crate) const fn uart_mut(&mut self) -> &mut Uart {
         &mut self.uart
     }
 
-    /// Instant up to which the module is computed.
+    /// Returns the instant up to which the module is computed.
     pub(crate) const fn now(&self) -> Time {
         self.now
     }
@@ -314,7 +314,7 @@ impl Module {
         core::mem::take(&mut self.news)
     }
 
-    /// Whether there is news to take.
+    /// Returns whether there is news to take.
     pub(crate) fn has_news(&self) -> bool {
         !self.news.is_empty()
     }

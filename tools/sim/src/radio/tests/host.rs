@@ -22,7 +22,7 @@ pub struct Host {
 pub type Received = (u8, Time, Time);
 
 impl Host {
-    /// A module with the factory parameters and its power on, in sleep.
+    /// Returns a module with the factory parameters and its power on, in sleep.
     pub fn in_sleep() -> Self {
         let mut host = Self::off(Parameters::FACTORY);
         host.radio.module.set_power(true);
@@ -31,7 +31,7 @@ impl Host {
         host
     }
 
-    /// A module with these parameters and its power on, in normal mode.
+    /// Returns a module with these parameters and its power on, in normal mode.
     pub fn in_normal_mode(parameters: Parameters) -> Self {
         let mut host = Self::off(parameters);
         host.radio.module.set_pins(false, false);
@@ -42,7 +42,7 @@ impl Host {
         host
     }
 
-    /// A module without power.
+    /// Returns a module without power.
     pub fn off(stored: Parameters) -> Self {
         let mut radio = Radio::new(stored, Corner::Nominal);
         radio.set_tx_pin(TxPin::Usart, Time::ZERO);
@@ -76,7 +76,8 @@ impl Host {
         self.radio.module.set_pins(m0, m1);
     }
 
-    /// Sends bytes without gaps, from now on or after those that are still queued. Returns the end of the last stop bit.
+    /// Sends bytes without gaps, from now on or after those that are still queued. Returns the end of the last stop
+    /// bit.
     pub fn send(&mut self, bytes: &[u8]) -> Time {
         let first = self.queued_until.max(self.now());
         for (&byte, n) in bytes.iter().zip(0..) {
@@ -111,7 +112,7 @@ impl Host {
         self.run_until(self.now() + span);
     }
 
-    /// The bytes that were received since the last call.
+    /// Returns the bytes that were received since the last call.
     pub fn received(&mut self) -> Vec<Received> {
         let framing = Framing::of(self.settings);
         let now = self.now();
@@ -131,19 +132,19 @@ impl Host {
         bytes(&self.received())
     }
 
-    /// The instants of the edges of AUX from `from` on.
+    /// Returns the instants of the edges of AUX from `from` on.
     pub fn aux_since(&self, from: Time) -> Vec<(Time, bool)> {
         let edges = self.aux.iter().copied();
         edges.filter(|&(at, _)| at >= from).collect()
     }
 }
 
-/// The bytes without their times.
+/// Returns the bytes without their times.
 pub fn bytes(received: &[Received]) -> Vec<u8> {
     received.iter().map(|&(byte, ..)| byte).collect()
 }
 
-/// Whether two instants differ by rounding only.
+/// Returns whether two instants differ by rounding only.
 pub fn near(a: Time, b: Time) -> bool {
     a.max(b) - a.min(b) < Time::from_ns(1)
 }

@@ -6,7 +6,7 @@ use f103::corner::Corner;
 use f103::periph::usart::{TxPin, Wire};
 use f103::time::Time;
 
-/// Duration of a byte at 9600 8N1.
+/// Returns the duration of a byte at 9600 8N1.
 fn byte() -> Time {
     Time::cycles(10, 9600)
 }

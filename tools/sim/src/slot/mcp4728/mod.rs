@@ -31,7 +31,7 @@ pub struct Setting {
 }
 
 impl Setting {
-    /// The setting in the two bytes of the write commands: VREF PD1 PD0 Gx D11-D8, D7-D0.
+    /// Returns the setting in the two bytes of the write commands: VREF PD1 PD0 Gx D11-D8, D7-D0.
     const fn from_bytes(high: u8, low: u8) -> Self {
         Self {
             code: (high as u16 & 0x0F) << 8 | low as u16,
@@ -41,7 +41,7 @@ impl Setting {
         }
     }
 
-    /// The setting as two bytes of the read command, in the same form.
+    /// Returns the setting as two bytes of the read command, in the same form.
     const fn to_bytes(self) -> [u8; 2] {
         let high = (self.internal_reference as u8) << 7
             | self.power_down << 5
@@ -104,7 +104,7 @@ impl Default for Mcp4728 {
 }
 
 impl Mcp4728 {
-    /// A chip with these settings in its EEPROM, directly after power-on.
+    /// Returns a chip with these settings in its EEPROM, directly after power-on.
     #[must_use]
     pub const fn new(eeprom: [Setting; 4]) -> Self {
         Self {
@@ -118,19 +118,19 @@ impl Mcp4728 {
         }
     }
 
-    /// The same chip at `address`, 0x60 to 0x67.
+    /// Returns the same chip at `address`, 0x60 to 0x67.
     #[must_use]
     pub const fn at(self, address: u8) -> Self {
         Self { address, ..self }
     }
 
-    /// The four input registers. The outputs follow them.
+    /// Returns the four input registers. The outputs follow them.
     #[must_use]
     pub const fn registers(&self) -> [Setting; 4] {
         self.registers
     }
 
-    /// The four settings in the EEPROM.
+    /// Returns the four settings in the EEPROM.
     #[must_use]
     pub const fn eeprom(&self) -> [Setting; 4] {
         self.eeprom
@@ -297,7 +297,7 @@ impl Mcp4728 {
     }
 }
 
-/// The number of the channel in a command byte: bits DAC1 and DAC0.
+/// Returns the number of the channel in a command byte: bits DAC1 and DAC0.
 const fn channel_of(command: u8) -> usize {
     (command >> 1 & 3) as usize
 }
