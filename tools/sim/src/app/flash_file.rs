@@ -15,7 +15,7 @@ use sim::Board;
 pub struct FlashFile {
     /// Path of the file itself, with symlinks followed, so that a symlink is not replaced.
     path: PathBuf,
-    /// [`Board::flash_changes`] of the contents; `None` if the file has not been written yet, or if the last attempt
+    /// [`sim::Chip::flash_changes`] of the contents; `None` if the file has not been written yet, or if the last attempt
     /// has failed.
     holds: Option<u64>,
     /// The last write error that was reported.

@@ -19,7 +19,7 @@ use gdbstub::target::{Target, TargetError, TargetResult};
 use super::super::bench::Bench;
 
 /// Number of registers that GDB gets, in the order of [`CortexM::target_description_xml`] and of
-/// [`sim::Board::register`].
+/// [`sim::Chip::register`].
 const REGISTERS: usize = 23;
 /// Most breakpoints that are in force at the same time.
 const BREAKPOINTS: usize = 1000;
