@@ -95,12 +95,14 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         if !self.uart.driver_is_off() {
             return false;
         }
+        // In this order: a timer that stops between the two reads has its event pending in the second one.
+        let is_running = self.gap.is_running();
         let is_pending = self.gap.is_pending();
         let was_pending = core::mem::replace(&mut self.is_pending, is_pending);
         if is_pending {
             !was_pending
         } else {
-            self.port.is_idle() || self.gap.is_running()
+            is_running || self.port.is_idle()
         }
     }
 

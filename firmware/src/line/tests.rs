@@ -1,6 +1,7 @@
 //! Tests of a line with a simulated UART and timer.
 
 extern crate std;
+use core::cell::Cell;
 use std::boxed::Box;
 use std::vec::Vec;
 
@@ -100,6 +101,19 @@ struct FakeGap {
     passed: Option<Silence>,
     limited: bool,
     limit_passed: bool,
+    /// The timer stops directly after the next read of its state.
+    stops: Cell<bool>,
+    stopped: Cell<bool>,
+}
+
+impl FakeGap {
+    fn look(&self, state: fn(&Self) -> bool) -> bool {
+        let seen = state(self);
+        if self.stops.take() {
+            self.stopped.set(true);
+        }
+        seen
+    }
 }
 
 impl GapTimer for FakeGap {
@@ -112,11 +126,11 @@ impl GapTimer for FakeGap {
     }
 
     fn is_running(&self) -> bool {
-        self.running
+        self.look(|gap| gap.running && !gap.stopped.get())
     }
 
     fn is_pending(&self) -> bool {
-        self.passed.is_some()
+        self.look(|gap| gap.passed.is_some() || gap.stopped.get())
     }
 
     fn take_event(&mut self) -> Silence {
@@ -234,6 +248,14 @@ fn timer_that_stopped_in_a_frame_is_started_again() {
     bench.line.gap.running = false;
     assert!(bench.pass(1) && bench.line.gap.running);
     assert!(!bench.pass(3), "a repair is reported once");
+}
+
+#[test]
+fn timer_that_stops_during_the_check_has_ended_a_frame() {
+    let mut bench = Bench::new();
+    bench.receive(&REQUEST);
+    bench.line.gap.stops.set(true);
+    assert!(!bench.pass(1));
 }
 
 #[test]
