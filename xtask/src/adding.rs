@@ -10,8 +10,7 @@ use register_map::board::MODIO_02;
 
 use crate::build;
 use crate::command;
-use crate::test::SUITE;
-use crate::workspace::{ALL, Workspace};
+use crate::workspace::{ALL, SUITE, Workspace};
 
 /// The patch that adds the module.
 const PATCH: &str = "docs/adding-a-module.patch";

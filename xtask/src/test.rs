@@ -14,15 +14,11 @@ use crate::error::{missing, usage};
 use crate::python::{masters, page};
 use crate::renode::checks;
 use crate::steps::{self, Done};
-use crate::workspace::{ALL, Workspace};
+use crate::workspace::{ALL, SUITE, Workspace};
 use crate::{adding, bench, build, command, fuzz, group, ordinary, peers, size, table};
 
 /// The variable with the corner of the part for the tests of the image.
 pub const CORNER: &str = "MODIO_CORNER";
-
-/// The feature with which the conformance suite contains the simulator. All tests are built with it, so that nothing is
-/// built twice.
-pub const SUITE: &str = "hil/sim";
 
 /// The packages of the image.
 const TARGET_PACKAGES: &str = "firmware board-support modio-drivers modbus-server register-map";

@@ -97,6 +97,10 @@ impl Workspace {
 /// than it needs.
 pub const ALL: [&str; 2] = ["--workspace", "--ignore-rust-version"];
 
+/// The feature with which the conformance suite contains the simulator. All tests are built with it, so that nothing is
+/// built twice.
+pub const SUITE: &str = "hil/sim";
+
 /// Runs a build of cargo, which shows its progress, and returns its products.
 pub fn artifacts(cargo: &mut Command) -> Result<Vec<Artifact>> {
     cargo.arg("--message-format=json-render-diagnostics");

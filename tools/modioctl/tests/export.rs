@@ -448,6 +448,8 @@ proptest! {
 
     #[test]
     fn no_text_of_a_unit_changes_the_structure_of_an_export(texts in prop::collection::vec(texts(), 1..8)) {
+        // A sensor with one of these units has a device class in Home Assistant.
+        prop_assume!(texts.iter().all(|text| !["uA", "mV", "Cel", "s"].contains(&text.as_str())));
         let unit = |texts: &[String]| {
             let unit = describe(&MODIO_02, "0.1.0", |_| Module::Ai2Ao2);
             Book::new(with_texts(unit, texts), vec![(0, 1); 32])

@@ -30,11 +30,26 @@ pub fn description() -> Description {
         super::post_channel,
         super::post_slot_module,
         super::post_slot_channel,
-        crate::app::http::stream_of_first,
+        get_events,
     ),
     modifiers(&Replies)
 )]
 struct Interface;
+
+/// Server-sent events: `state` at the beginning and whenever it has changed, at most ten times a second; `frame` when a
+/// frame has ended; `lost`, with the number of missed events, when the client reads too slowly
+#[utoipa::path(
+    get,
+    path = "/api/events",
+    responses((
+        status = 200,
+        description = "The stream; the data of `state` is a State, of `frame` a Frame",
+        body = String,
+        content_type = "text/event-stream",
+    ))
+)]
+#[expect(dead_code, reason = "`http` carries this request out")]
+fn get_events() {}
 
 /// Adds the replies that all requests that change something have in common.
 struct Replies;

@@ -207,19 +207,7 @@ async fn not_get() -> api::Reply {
     api::Reply::error(405, "this path accepts GET only")
 }
 
-/// Server-sent events: `state` at the beginning and whenever it has changed, at most ten times a second; `frame` when a
-/// frame has ended; `lost`, with the number of missed events, when the client reads too slowly
-#[utoipa::path(
-    get,
-    path = "/api/events",
-    responses((
-        status = 200,
-        description = "The stream; the data of `state` is a State, of `frame` a Frame",
-        body = String,
-        content_type = "text/event-stream",
-    ))
-)]
-pub async fn stream_of_first(State(server): State<Server>) -> Result<Response, api::Reply> {
+async fn stream_of_first(State(server): State<Server>) -> Result<Response, api::Reply> {
     stream(server, 0, "/api/state").await
 }
 
