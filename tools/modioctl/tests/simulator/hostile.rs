@@ -65,11 +65,11 @@ fn an_echo_is_not_mistaken_for_a_unit() {
     let nobody = echo(None);
     for at in [At::tcp(nobody), At::modbus_tcp(nobody)] {
         for words in COMMANDS {
-            let words = format!("--timeout 20ms --retries 1 {words}");
+            let words = format!("--timeout 60ms --retries 1 {words}");
             let text = at.run(&words).failed(3);
             assert!(text.contains("returns what it sends"), "{words}: {text}");
         }
-        let text = at.run("--timeout 20ms scan --units 1-3").failed(3);
+        let text = at.run("--timeout 60ms scan --units 1-3").failed(3);
         assert!(text.contains("returns what it sends"), "{text}");
     }
 }

@@ -134,11 +134,14 @@ fn delayed(addresses: &[u8]) -> (SocketAddr, Receiver<u8>) {
             match (master.read(&mut bytes), answer.take()) {
                 (Ok(0), _) => return,
                 (Ok(count), _) => {
-                    let (unit, pdu) = Framing::Rtu.open(&bytes[..count]).unwrap();
-                    let _ = tell.send(unit);
-                    let pdu = server.answer(&pdu);
-                    let pdu = pdu.unwrap_or_else(|code| vec![bytes[1] | 0x80, code]);
-                    answer = addresses.contains(&unit).then(|| framed(None, unit, &pdu));
+                    // On a busy host one read may return several requests of the scan, which have 8 bytes each.
+                    for request in bytes[..count].chunks(8) {
+                        let (unit, pdu) = Framing::Rtu.open(request).unwrap();
+                        let _ = tell.send(unit);
+                        let pdu = server.answer(&pdu);
+                        let pdu = pdu.unwrap_or_else(|code| vec![request[1] | 0x80, code]);
+                        answer = addresses.contains(&unit).then(|| framed(None, unit, &pdu));
+                    }
                 }
                 (Err(_), Some(answer)) => master.write_all(&answer).unwrap(),
                 (Err(error), None) => panic!("{error}"),
