@@ -74,10 +74,7 @@ impl Wire for BluePill {
         let wave = &mut self.terminal.wave;
         match sent {
             Sent::Character(character) => {
-                for bit in 0..character.bits {
-                    let at = character.start + character.bit * u64::from(bit);
-                    wave.push(at, character.level(bit));
-                }
+                wave.push_character(&character);
             }
             Sent::Cut(at) => {
                 wave.truncate(at);

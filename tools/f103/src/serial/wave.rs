@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use super::Character;
 use crate::time::Time;
 
 /// The level of a wire over time.
@@ -27,6 +28,14 @@ impl Wave {
         Self {
             before: level,
             edges: VecDeque::new(),
+        }
+    }
+
+    /// Sets the levels of the bits of a character, which must not begin before the last edge.
+    pub fn push_character(&mut self, character: &Character) {
+        for bit in 0..character.bits {
+            let at = character.start + character.bit * u64::from(bit);
+            self.push(at, character.level(bit));
         }
     }
 

@@ -49,12 +49,7 @@ pub(super) struct Master {
 impl Master {
     /// Queues `character` at its start time, which must not be before the end of the queue.
     fn push(&mut self, character: &Character, end: Time) {
-        for bit in 0..character.bits {
-            self.wave.push(
-                character.start + character.bit * u64::from(bit),
-                character.level(bit),
-            );
-        }
+        self.wave.push_character(character);
         self.wave.push(character.end(), true);
         match self.sending.back_mut() {
             Some(span) if span.end == character.start => span.end = end,

@@ -122,10 +122,7 @@ impl Line {
         self.shared.changed = true;
         match sent {
             Sent::Character(character) => {
-                for bit in 0..character.bits {
-                    let at = character.start + character.bit * u64::from(bit);
-                    self.usart.push(at, character.level(bit));
-                }
+                self.usart.push_character(&character);
                 self.last_sent = Some(Span {
                     start: character.start,
                     end: character.end(),

@@ -82,10 +82,7 @@ impl Uart {
         {
             match sent {
                 Sent::Character(character) => {
-                    for bit in 0..character.bits {
-                        let at = character.start + character.bit * u64::from(bit);
-                        wave.push(at, character.level(bit));
-                    }
+                    wave.push_character(&character);
                 }
                 Sent::Cut(at) => {
                     wave.truncate(at);
@@ -147,10 +144,7 @@ impl Uart {
         for (byte, n) in bytes.into_iter().zip(0..) {
             let (start, end) = (first + self.bytes(n), first + self.bytes(n + 1));
             let character = Character::new(self.settings, byte).at(start);
-            for bit in 0..character.bits {
-                let at = character.start + character.bit * u64::from(bit);
-                self.txd.push(at, character.level(bit));
-            }
+            self.txd.push_character(&character);
             self.sent.push_back(Byte { byte, start, end });
             self.sent_until = end;
         }

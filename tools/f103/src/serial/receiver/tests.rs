@@ -9,9 +9,7 @@ fn settings(baud: u32, format: Format) -> Settings {
 }
 
 fn play(wave: &mut Wave, c: Character) {
-    for bit in 0..c.bits {
-        wave.push(c.start + c.bit * u64::from(bit), c.level(bit));
-    }
+    wave.push_character(&c);
     wave.push(c.end(), true);
 }
 
