@@ -27,12 +27,18 @@ pub fn frame(
     }
 }
 
-/// Describes what is wrong with bytes that are not a frame.
-fn damaged(framing: Framing, bytes: &[u8]) -> String {
-    let count = match bytes.len() {
+/// Returns how many bytes these are, in words.
+#[must_use]
+pub fn count_of(bytes: &[u8]) -> String {
+    match bytes.len() {
         1 => "1 byte".to_owned(),
         length => format!("{length} bytes"),
-    };
+    }
+}
+
+/// Describes what is wrong with bytes that are not a frame.
+fn damaged(framing: Framing, bytes: &[u8]) -> String {
+    let count = count_of(bytes);
     match (framing, bytes) {
         (Framing::Mbap, _) => format!("not a complete frame, {count}"),
         (_, [b':', .., b'\r', b'\n']) => format!("{count} with a bad LRC"),

@@ -281,7 +281,7 @@ pub struct Watch {
     #[arg(long)]
     pub raw: bool,
     /// Number of times to print the values
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = times)]
     pub count: Option<u64>,
 }
 
@@ -346,6 +346,14 @@ pub struct Export {
     /// Overwrite an existing file
     #[arg(long)]
     pub force: bool,
+}
+
+/// Parses the number of times of a command.
+fn times(text: &str) -> Result<u64, String> {
+    match text.parse() {
+        Ok(times) if times > 0 => Ok(times),
+        _ => Err("a number of times is a whole number from 1 on".to_owned()),
+    }
 }
 
 fn line_name(text: &str) -> Result<String, String> {

@@ -155,7 +155,7 @@ fn milliseconds(time: Duration) -> f64 {
 /// Returns a piece in words, for people.
 fn words(framing: Framing, piece: &Piece) -> String {
     match &piece.kind {
-        Kind::Garbled => format!("garbled: {} bytes", piece.bytes.len()),
+        Kind::Garbled => format!("garbled: {}", decode::count_of(&piece.bytes)),
         Kind::Frame {
             direction, request, ..
         } => {
@@ -246,7 +246,7 @@ mod tests {
             [
                 "    1.000         - ms -> 01 03 00 10 00 01 85 CF  unit 1: read holding registers 0x0010 x 1",
                 "    1.004      +4.3 ms <- 01 03 02 00 05 78 47  unit 1: read holding registers 0x0010 = 0005 (after 4.3 ms)",
-                "    1.004         - ms ?? FF  garbled: 1 bytes",
+                "    1.004         - ms ?? FF  garbled: 1 byte",
             ]
         );
     }
