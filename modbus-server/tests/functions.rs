@@ -181,7 +181,7 @@ fn requests_with_a_wrong_form_are_03_before_any_other_check() {
     // One word more than fits a frame, truncated to what fits.
     wrong.push(write_words(0, &[1; 124])[..253].to_vec());
     wrong.push(write_then_read(0, 1, 0, &[1; 122])[..253].to_vec());
-    // A byte count that does not fit the quantity, with as many bytes and with fewer or more.
+    // The byte count does not fit the quantity. The request has as many bytes as the count says, fewer, or more.
     for (count, data) in [
         (0, 0),
         (1, 1),

@@ -71,16 +71,7 @@ struct Terminal {
 
 impl Wire for BluePill {
     fn sent(&mut self, sent: Sent) {
-        let wave = &mut self.terminal.wave;
-        match sent {
-            Sent::Character(character) => {
-                wave.push_character(&character);
-            }
-            Sent::Cut(at) => {
-                wave.truncate(at);
-                wave.push(at, true);
-            }
-        }
+        sent.put_on(&mut self.terminal.wave);
     }
 
     fn advance(&mut self, to: Time) {

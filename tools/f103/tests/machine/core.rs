@@ -4,6 +4,7 @@ use f103::Time;
 use f103::finding::What;
 
 use super::asm::{Asm, When};
+use super::debug::counting;
 use super::regs::*;
 use super::{START, chip, findings, out};
 
@@ -24,13 +25,7 @@ fn step_executes_the_given_number_of_instructions_at_their_costs() {
 
 #[test]
 fn run_until_pc_stops_at_the_address_and_resumes_from_it() {
-    let mut program = Asm::new();
-    program.set(3, 0);
-    let top = program.here();
-    let address = program.address();
-    program.add(3, 1);
-    program.nop();
-    program.branch(When::Always, top);
+    let (address, program) = counting();
     let mut chip = chip(program);
     let limit = Time::from_ms(10);
     assert!(chip.run_until_pc(address | 1, limit));

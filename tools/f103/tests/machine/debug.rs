@@ -6,8 +6,8 @@ use super::asm::{Asm, When};
 use super::regs::*;
 use super::{START, chip, findings, out};
 
-/// A program that counts in r3 without end. Returns the address of the addition, and the program.
-fn counting() -> (u32, Asm) {
+/// Returns a program that counts in r3 without end, and before it the address of the addition.
+pub fn counting() -> (u32, Asm) {
     let mut program = Asm::new();
     program.set(3, 0);
     let top = program.here();

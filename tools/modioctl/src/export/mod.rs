@@ -79,12 +79,8 @@ impl Line<'_> {
         if self.endpoint.framing != Framing::Rtu {
             return None;
         }
-        // A character has 11 bits. Above 19200 bit/s the standard fixes the time at 1.75 ms.
-        let micros = match u64::from(self.endpoint.baud) {
-            baud @ 1..=19_200 => 38_500_000 / baud,
-            _ => 1_750,
-        };
-        Some(micros / 1000 + 2)
+        let silence = self.endpoint.line().t35();
+        Some(silence.as_millis() as u64 + 2)
     }
 
     /// Returns the name of the line: the name that the user gives, or else that of the only unit.

@@ -120,9 +120,9 @@ impl Line {
     /// Takes over the output of USART1 at its TX pin.
     fn put(&mut self, sent: Sent) {
         self.shared.changed = true;
+        sent.put_on(&mut self.usart);
         match sent {
             Sent::Character(character) => {
-                self.usart.push_character(&character);
                 self.last_sent = Some(Span {
                     start: character.start,
                     end: character.end(),
@@ -140,8 +140,6 @@ impl Line {
                 }
             }
             Sent::Cut(at) => {
-                self.usart.truncate(at);
-                self.usart.push(at, true);
                 if let Some(span) = &mut self.last_sent {
                     span.end = span.end.min(at);
                 }

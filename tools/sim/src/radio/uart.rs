@@ -75,20 +75,9 @@ impl Uart {
 
     /// Takes over what the transmitter at RXD has sent.
     pub(crate) fn put_in(&mut self, sent: Sent) {
-        let driven = self.pin == TxPin::Usart;
-        for wave in [Some(&mut self.host), driven.then_some(&mut self.rxd)]
-            .into_iter()
-            .flatten()
-        {
-            match sent {
-                Sent::Character(character) => {
-                    wave.push_character(&character);
-                }
-                Sent::Cut(at) => {
-                    wave.truncate(at);
-                    wave.push(at, true);
-                }
-            }
+        sent.put_on(&mut self.host);
+        if self.pin == TxPin::Usart {
+            sent.put_on(&mut self.rxd);
         }
     }
 

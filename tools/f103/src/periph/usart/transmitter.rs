@@ -1,6 +1,6 @@
 //! The transmitting half of a USART: transmit data register, shift register, and their times.
 
-use crate::serial::{Character, Rate};
+use crate::serial::{Character, Rate, Wave};
 use crate::time::Time;
 
 /// What a transmitter does to its TX pin.
@@ -10,6 +10,19 @@ pub enum Sent {
     Character(Character),
     /// The pin goes high: the rest of the character under way is lost.
     Cut(Time),
+}
+
+impl Sent {
+    /// Sets the levels of `wave` accordingly.
+    pub fn put_on(self, wave: &mut Wave) {
+        match self {
+            Self::Character(character) => wave.push_character(&character),
+            Self::Cut(at) => {
+                wave.truncate(at);
+                wave.push(at, true);
+            }
+        }
+    }
 }
 
 /// Format and bit length of the next character.
