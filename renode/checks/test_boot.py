@@ -161,12 +161,15 @@ class Board:
         """Runs to the first `wfi`. Returns whether it was reached."""
         reached = []
 
-        def look(core, address, _size, _data):
-            if bytes(core.mem_read(address, 2)) == WFI:
-                reached.append(address)
-                core.emu_stop()
+        def stop(core, address, _size, _data):
+            reached.append(address)
+            core.emu_stop()
 
-        self.core.hook_add(UC_HOOK_CODE, look, begin=FLASH, end=FLASH + self.flash_size)
+        flash = bytes(self.core.mem_read(FLASH, self.flash_size))
+        for at in range(0, len(flash), 2):
+            # A hook of every instruction would take half a minute.
+            if flash.startswith(WFI, at):
+                self.core.hook_add(UC_HOOK_CODE, stop, begin=FLASH + at, end=FLASH + at)
         stack, entry = struct.unpack("<II", self.core.mem_read(FLASH, 8))
         self.core.reg_write(UC_ARM_REG_SP, stack)
         self.core.emu_start(entry, 0, timeout=SECONDS * 1_000_000)
