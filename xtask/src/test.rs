@@ -3,6 +3,7 @@
 
 use std::env;
 use std::process::{Command, Stdio};
+use std::thread;
 
 use In::{Ci, Host, Test};
 use Run::{Each, Once};
@@ -273,7 +274,10 @@ fn suite(workspace: &mut Workspace) -> Result<()> {
 }
 
 fn tool(workspace: &mut Workspace) -> Result<()> {
-    simulated(workspace, "--test=simulator", "", &[])?;
+    // The simulators follow the wall clock, so the tests mostly wait.
+    let threads = thread::available_parallelism().map_or(2, |cores| cores.get() + 1);
+    let threads = format!("--test-threads={threads}");
+    simulated(workspace, "--test=simulator", &threads, &[])?;
     ensure!(
         which::which("node").is_ok(),
         missing(
@@ -300,7 +304,7 @@ fn sim_at(workspace: &mut Workspace, corner: &str) -> Result<()> {
 }
 
 /// Runs tests that run the images in the simulator, as an ordinary user: those of these targets whose names contain one
-/// of `names`, or all. Spaces separate targets and names. The variables choose the corner of the part, and how long a test is.
+/// of `names`, or all. Spaces separate targets and names. A name that begins with `--` is an option of the tests. The variables choose the corner of the part, and how long a test is.
 pub fn simulated(
     workspace: &mut Workspace,
     targets: &str,

@@ -132,15 +132,15 @@ def reduced(picture: Image.Image) -> Image.Image:
     return made
 
 
-def take_all(to: pathlib.Path):
-    """Takes all pictures, into the directory `to`."""
+def take_all(to: pathlib.Path, schemes=("light", "dark")):
+    """Takes all pictures in these colour schemes, into the directory `to`."""
     slots = ["--slot", "1=4di", "--slot", "2=2relay", "--slot", "3=4ai", "--slot", "4=4ao"]
     pictures = [("desktop", larger_board, {"board": "modio-08", "options": slots}),
                 ("phone", smaller_board, {"module": "2ai2ao"})]
     with sync_playwright() as playwright:
         browser = launch(playwright)
         for name, take, board in pictures:
-            for scheme in ("light", "dark"):
+            for scheme in schemes:
                 running = simulator.Simulator.of(dip=2, **board | {"options": [*EXACT, *board.get("options", ())]})
                 try:
                     line = Line(running.endpoint("exact-line"))

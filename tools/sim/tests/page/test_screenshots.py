@@ -11,10 +11,10 @@ IN_DOCS = pathlib.Path(__file__).resolve().parents[4] / "docs" / "images"
 
 
 class Screenshots(unittest.TestCase):
-    def test_every_picture_of_the_page_in_docs_is_taken_and_has_its_width(self):
+    def test_every_dark_picture_of_the_page_in_docs_is_taken_and_has_its_width(self):
         # The height depends on the fonts of the machine.
-        widths = lambda directory: {file.name: Image.open(file).width for file in directory.glob("panel-*.png")}
+        widths = lambda directory: {file.name: Image.open(file).width for file in directory.glob("panel-*-dark.png")}
         with tempfile.TemporaryDirectory() as directory:
             taken = pathlib.Path(directory)
-            take_all(taken)
+            take_all(taken, ["dark"])
             self.assertEqual(widths(taken), widths(IN_DOCS))
