@@ -8,6 +8,8 @@
 #![no_std]
 
 pub mod boards;
+pub mod boot;
+mod crc32;
 pub mod design;
 pub mod fault;
 pub mod gap;

@@ -1,0 +1,250 @@
+//! The header of an image: the first 512 bytes of a slot. The vector table of the application follows.
+//!
+//! | offset | bytes | content, little-endian |
+//! |---|---|---|
+//! | 0 | 4 | `MODI` |
+//! | 4 | 1, 1 | version of the header, 2; board, as in register 0x0205 |
+//! | 6 | 2 | security epoch |
+//! | 8 | 1, 1, 2 | version of the firmware: major, minor, patch |
+//! | 12 | 4, 4 | address of the slot; bytes of the application |
+//! | 20 | 4, 4 | CRC-32 of bytes 0 to 19 and the application; first 32 bits of the commit |
+//! | 28 | 64 | SHA-512 of the application |
+//! | 92 | 64 | Ed25519 signature of bytes 0 to 91 |
+//! | 156 | 4 | first bytes of the SHA-512 of the public key |
+//! | 160 | 352 | zero |
+
+use super::Reason;
+
+/// Bytes of the header.
+pub const BYTES: usize = 512;
+/// Bytes of the header that the CRC-32 covers, together with the application.
+pub const IN_CRC: usize = 20;
+/// Bytes of the header that are signed.
+pub const SIGNED: usize = 92;
+/// Least bytes of an application.
+pub const LEAST: usize = 512;
+
+const MAGIC: [u8; 4] = *b"MODI";
+const VERSION: u8 = 2;
+/// First byte of the area that is zero.
+const ZERO: usize = 160;
+
+/// The header of an image.
+#[derive(Clone, Copy, Debug)]
+pub struct Header<'a>(&'a [u8; BYTES]);
+
+impl<'a> Header<'a> {
+    /// Returns the header at the beginning of a slot.
+    ///
+    /// # Errors
+    ///
+    /// [`Reason::Magic`] if there is none.
+    pub fn of(slot: &'a [u8]) -> Result<Self, Reason> {
+        let (bytes, _) = slot.split_first_chunk().ok_or(Reason::Magic)?;
+        let header = Self(bytes);
+        let zero = bytes[ZERO..].iter().all(|byte| *byte == 0);
+        if header.array(0) == MAGIC && bytes[4] == VERSION && zero {
+            Ok(header)
+        } else {
+            Err(Reason::Magic)
+        }
+    }
+
+    fn array<const N: usize>(&self, at: usize) -> [u8; N] {
+        core::array::from_fn(|n| self.0[(at + n) % BYTES])
+    }
+
+    /// Returns the board's code.
+    #[must_use]
+    pub const fn board(&self) -> u8 {
+        self.0[5]
+    }
+
+    /// Returns the security epoch.
+    #[must_use]
+    pub fn epoch(&self) -> u16 {
+        u16::from_le_bytes(self.array(6))
+    }
+
+    /// Returns the version of the firmware: major and minor, patch.
+    #[must_use]
+    pub fn version(&self) -> ([u8; 2], u16) {
+        (self.array(8), u16::from_le_bytes(self.array(10)))
+    }
+
+    /// Returns the address of the slot that the image is linked for.
+    #[must_use]
+    pub fn address(&self) -> u32 {
+        u32::from_le_bytes(self.array(12))
+    }
+
+    /// Returns the bytes of the application.
+    #[must_use]
+    pub fn length(&self) -> u32 {
+        u32::from_le_bytes(self.array(16))
+    }
+
+    /// Returns the CRC-32.
+    #[must_use]
+    pub fn crc(&self) -> u32 {
+        u32::from_le_bytes(self.array(20))
+    }
+
+    /// Returns the first 32 bits of the commit.
+    #[must_use]
+    pub fn commit(&self) -> u32 {
+        u32::from_le_bytes(self.array(24))
+    }
+
+    /// Returns the SHA-512 of the application.
+    #[must_use]
+    pub fn hash(&self) -> [u8; 64] {
+        self.array(28)
+    }
+
+    /// Returns the bytes that are signed.
+    #[must_use]
+    pub fn signed(&self) -> &'a [u8] {
+        &self.0[..SIGNED]
+    }
+
+    /// Returns the Ed25519 signature.
+    #[must_use]
+    pub fn signature(&self) -> [u8; 64] {
+        self.array(92)
+    }
+
+    /// Returns the first bytes of the SHA-512 of the public key that signed.
+    #[must_use]
+    pub fn key(&self) -> u32 {
+        u32::from_be_bytes(self.array(156))
+    }
+
+    /// Checks that the image is for a board and for the slot at an address.
+    ///
+    /// # Errors
+    ///
+    /// [`Reason::Board`] or [`Reason::Address`].
+    pub fn suits(&self, board: u8, address: u32) -> Result<(), Reason> {
+        if self.board() != board {
+            Err(Reason::Board)
+        } else if self.address() != address {
+            Err(Reason::Address)
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Returns the application, in the slot that begins with this header.
+    ///
+    /// # Errors
+    ///
+    /// [`Reason::Length`] unless its bytes are a multiple of 4, [`LEAST`] or more, and fit the slot.
+    pub fn application<'b>(&self, slot: &'b [u8]) -> Result<&'b [u8], Reason> {
+        let length = self.length() as usize;
+        let application = slot.get(BYTES..).and_then(|rest| rest.get(..length));
+        application
+            .filter(|_| length >= LEAST && length.is_multiple_of(4))
+            .ok_or(Reason::Length)
+    }
+}
+
+/// Returns the header of an image whose magic number, bounds, zero bytes and CRC-32 are right. `crc` computes the
+/// CRC-32 of parts whose bytes are multiples of 4, one after the other.
+///
+/// # Errors
+///
+/// What is wrong with it.
+pub fn intact<'a>(
+    slot: &'a [u8],
+    crc: impl FnOnce([&[u8]; 2]) -> u32,
+) -> Result<Header<'a>, Reason> {
+    let header = Header::of(slot)?;
+    let application = header.application(slot)?;
+    if crc([&header.0[..IN_CRC], application]) == header.crc() {
+        Ok(header)
+    } else {
+        Err(Reason::Crc)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use std::vec::Vec;
+
+    use super::*;
+    use crate::crc32::crc32;
+
+    fn crc(parts: [&[u8]; 2]) -> u32 {
+        let words: Vec<u32> = parts
+            .concat()
+            .as_chunks()
+            .0
+            .iter()
+            .map(|word| u32::from_le_bytes(*word))
+            .collect();
+        crc32(&words)
+    }
+
+    /// A slot of 2 KiB with an application of 1 KiB.
+    fn slot() -> Vec<u8> {
+        let mut slot = std::vec![0xFF; 2048];
+        slot[..BYTES].fill(0);
+        slot[..4].copy_from_slice(b"MODI");
+        slot[4..8].copy_from_slice(&[2, 1, 7, 0]);
+        slot[8..12].copy_from_slice(&[0, 3, 4, 0]);
+        slot[12..16].copy_from_slice(&0x0800_4000u32.to_le_bytes());
+        slot[16..20].copy_from_slice(&1024u32.to_le_bytes());
+        slot[24..28].copy_from_slice(&[0x34, 0x12, 0xCD, 0xAB]);
+        (0..1024).for_each(|n| slot[BYTES + n] = (n * n) as u8);
+        let right = crc([&slot[..IN_CRC], &slot[BYTES..BYTES + 1024]]);
+        slot[20..24].copy_from_slice(&right.to_le_bytes());
+        slot
+    }
+
+    #[test]
+    fn fields_are_at_the_offsets_of_the_contract() {
+        let slot = slot();
+        let header = intact(&slot, crc).unwrap();
+        assert_eq!((header.board(), header.epoch()), (1, 7));
+        assert_eq!(header.version(), ([0, 3], 4));
+        assert_eq!((header.address(), header.length()), (0x0800_4000, 1024));
+        assert_eq!(header.commit(), 0xABCD_1234);
+        assert_eq!(header.suits(1, 0x0800_4000), Ok(()));
+        assert_eq!(header.suits(2, 0x0800_4000), Err(Reason::Board));
+        assert_eq!(header.suits(1, 0x0801_1800), Err(Reason::Address));
+    }
+
+    #[test]
+    fn any_wrong_bit_of_what_the_crc_covers_or_of_the_zero_area_is_found() {
+        let right = slot();
+        let covered = (0..24).chain(ZERO..BYTES + 1024);
+        for (byte, bit) in covered.flat_map(|byte| (0..8).map(move |bit| (byte, bit))) {
+            let mut wrong = right.clone();
+            wrong[byte] ^= 1 << bit;
+            assert!(intact(&wrong, crc).is_err(), "byte {byte} bit {bit}");
+        }
+    }
+
+    #[test]
+    fn lengths_outside_the_slot_are_refused_before_anything_is_read() {
+        for length in [
+            0,
+            508,
+            510,
+            1026,
+            1540,
+            2048,
+            0x8000_0000,
+            u32::MAX - 3,
+            u32::MAX,
+        ] {
+            let mut slot = slot();
+            slot[16..20].copy_from_slice(&length.to_le_bytes());
+            let refused = intact(&slot, |_| unreachable!()).unwrap_err();
+            assert_eq!(refused, Reason::Length, "{length}");
+        }
+        assert_eq!(intact(&slot()[..511], crc).unwrap_err(), Reason::Magic);
+    }
+}

@@ -1,0 +1,247 @@
+//! The boot state in two pages of flash: sealed records, the newest of which counts.
+//!
+//! ```text
+//! half-word  0-1     number, which is never used twice
+//!            2       preferred slot (bit 0), codes of the states of A (bits 8-11) and B (bits 12-15)
+//!            3       details of the states of A (low byte) and B
+//!            4       epoch floor
+//!            5       the layout, and no erased half-word
+//!            6-7     CRC-32 of the words before
+//!            8, 9    seals: 0 when programmed
+//! ```
+//!
+//! Records are appended to a page. When it is full, or when something lies behind its newest record, the other page is
+//! erased and takes the next record, so a change is always one record, and the newest one is never erased. A record
+//! counts once its first seal is programmed, after its CRC is complete: a cut leaves the state before or after. A seal
+//! whose programming was cut may read differently from start to start; [`Journal::seal_again`] ends that before
+//! anything is decided.
+
+use super::{Record, Slot, State};
+use crate::{
+    crc32::crc32,
+    pages::{Page, Pages},
+};
+
+/// Half-words of a record.
+const HALVES: usize = 10;
+/// Half-words in front of the seals.
+const UNSEALED: usize = HALVES - 2;
+const BYTES: usize = 2 * HALVES;
+/// Version of the layout.
+const LAYOUT: u16 = 0x4201;
+
+/// Error of a change of the boot state. The state before is still in force.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JournalError<E> {
+    /// The flash refused an operation.
+    Flash(E),
+    /// The flash does not read back as programmed.
+    Worn,
+}
+
+impl<E> From<E> for JournalError<E> {
+    fn from(error: E) -> Self {
+        Self::Flash(error)
+    }
+}
+
+/// A record in flash.
+#[derive(Clone, Copy, Debug)]
+struct Found {
+    page: Page,
+    offset: usize,
+    number: u32,
+    record: Record,
+    /// Both seals are programmed.
+    sealed_twice: bool,
+}
+
+/// The state of the two pages.
+#[derive(Clone, Copy, Debug)]
+pub struct Journal {
+    newest: Option<Found>,
+    /// The highest number of a record whose CRC is right, sealed or not.
+    number: u32,
+    /// Where the next record goes without an erase.
+    free: Option<(Page, usize)>,
+}
+
+impl Journal {
+    /// Reads both pages.
+    #[must_use]
+    pub fn open(flash: &impl Pages) -> Self {
+        let mut journal = Self {
+            newest: None,
+            number: 0,
+            free: None,
+        };
+        for page in [Page::First, Page::Second] {
+            journal.read(page, flash.page(page));
+        }
+        if let Some(found) = journal.newest {
+            let behind = found.offset + BYTES;
+            let rest = flash.page(found.page).get(behind..).unwrap_or_default();
+            let is_free = rest.len() >= BYTES && rest.iter().all(|byte| *byte == 0xFF);
+            journal.free = is_free.then_some((found.page, behind));
+        }
+        journal
+    }
+
+    fn read(&mut self, page: Page, bytes: &[u8]) {
+        for (at, bytes) in bytes.as_chunks::<BYTES>().0.iter().enumerate() {
+            let halves: [u16; HALVES] = core::array::from_fn(|n| {
+                u16::from_le_bytes([bytes[2 * n % BYTES], bytes[(2 * n + 1) % BYTES]])
+            });
+            let Some((number, record)) = decoded(&halves) else {
+                continue;
+            };
+            self.number = self.number.max(number);
+            let seals = [halves[UNSEALED] == 0, halves[UNSEALED + 1] == 0];
+            let newest = self.newest.map_or(0, |newest| newest.number);
+            if seals != [false; 2] && number > newest {
+                self.newest = Some(Found {
+                    page,
+                    offset: at * BYTES,
+                    number,
+                    record,
+                    sealed_twice: seals == [true; 2],
+                });
+            }
+        }
+    }
+
+    /// Returns the boot state, or `None` before the first one was written.
+    #[must_use]
+    pub fn record(&self) -> Option<Record> {
+        self.newest.map(|found| found.record)
+    }
+
+    /// Programs the seals of the newest record again if a cut left only one. Call this at the start, before the state
+    /// is used.
+    ///
+    /// # Errors
+    ///
+    /// When the flash refuses. The state is used as it was read.
+    pub fn seal_again<F: Pages>(&mut self, flash: &mut F) -> Result<(), JournalError<F::Error>> {
+        match &mut self.newest {
+            Some(found) if !found.sealed_twice => {
+                seal(flash, found.page, found.offset)?;
+                found.sealed_twice = true;
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Writes a new boot state.
+    ///
+    /// # Errors
+    ///
+    /// When the flash fails in both pages. The state before is still in force.
+    pub fn write<F: Pages>(
+        &mut self,
+        flash: &mut F,
+        record: Record,
+    ) -> Result<(), JournalError<F::Error>> {
+        if let Some((page, offset)) = self.free.take()
+            && self.append(flash, record, page, offset).is_ok()
+        {
+            return Ok(());
+        }
+        let page = self.newest.map_or(Page::First, |found| found.page.other());
+        flash.erase(page)?;
+        self.append(flash, record, page, 0)
+    }
+
+    fn append<F: Pages>(
+        &mut self,
+        flash: &mut F,
+        record: Record,
+        page: Page,
+        offset: usize,
+    ) -> Result<(), JournalError<F::Error>> {
+        // Every attempt has a number of its own, because its remains may read as a record later.
+        self.number += 1;
+        let halves = encoded(self.number, record);
+        for (n, half) in halves.into_iter().enumerate() {
+            flash.program(page, offset + 2 * n, half)?;
+        }
+        let bytes = flash.page(page).get(offset..offset + 2 * UNSEALED);
+        if bytes != Some(halves.map(u16::to_le_bytes).as_flattened()) {
+            return Err(JournalError::Worn);
+        }
+        seal(flash, page, offset)?;
+        self.newest = Some(Found {
+            page,
+            offset,
+            number: self.number,
+            record,
+            sealed_twice: true,
+        });
+        let next = offset + BYTES;
+        let has_room = next + BYTES <= flash.page(page).len();
+        self.free = has_room.then_some((page, next));
+        Ok(())
+    }
+}
+
+fn seal<F: Pages>(flash: &mut F, page: Page, offset: usize) -> Result<(), JournalError<F::Error>> {
+    for n in UNSEALED..HALVES {
+        flash.program(page, offset + 2 * n, 0)?;
+    }
+    let seals = flash.page(page).get(offset + 2 * UNSEALED..offset + BYTES);
+    if seals == Some(&[0; 4]) {
+        Ok(())
+    } else {
+        Err(JournalError::Worn)
+    }
+}
+
+fn encoded(number: u32, record: Record) -> [u16; UNSEALED] {
+    let [a, b] = record.states.map(State::code);
+    let preferred = u16::from(record.preferred == Slot::B);
+    let mut halves = [
+        number as u16,
+        (number >> 16) as u16,
+        preferred | u16::from(a.0) << 8 | u16::from(b.0) << 12,
+        u16::from_le_bytes([a.1, b.1]),
+        record.floor,
+        LAYOUT,
+        0,
+        0,
+    ];
+    let crc = crc_of(&halves);
+    halves[UNSEALED - 2] = crc as u16;
+    halves[UNSEALED - 1] = (crc >> 16) as u16;
+    halves
+}
+
+/// Returns the CRC-32 of the words in front of it.
+fn crc_of(halves: &[u16; UNSEALED]) -> u32 {
+    let [a, b, c, d, e, f, ..] = halves.map(u32::from);
+    crc32(&[a | b << 16, c | d << 16, e | f << 16])
+}
+
+/// Returns the number and the boot state of a record whose CRC is right.
+fn decoded(halves: &[u16; HALVES]) -> Option<(u32, Record)> {
+    let (unsealed, _) = halves.split_first_chunk::<UNSEALED>()?;
+    let [low, high, codes, details, floor, layout, crc_low, crc_high] = *unsealed;
+    let crc = u32::from(crc_high) << 16 | u32::from(crc_low);
+    if layout != LAYOUT || crc != crc_of(unsealed) {
+        return None;
+    }
+    let [a, b] = details.to_le_bytes();
+    let record = Record {
+        preferred: if codes & 1 == 0 { Slot::A } else { Slot::B },
+        states: [
+            State::from_code((codes >> 8) as u8 & 15, a)?,
+            State::from_code((codes >> 12) as u8, b)?,
+        ],
+        floor,
+    };
+    Some((u32::from(high) << 16 | u32::from(low), record))
+}
+
+#[cfg(test)]
+#[path = "journal_tests.rs"]
+mod tests;

@@ -1,0 +1,175 @@
+//! The decisions of the loader, in the order in which it makes them at every start.
+
+use super::{Reason, Record, Slot, State, TRIALS};
+
+/// What the loader needs of the part.
+pub trait Part {
+    /// Returns whether a slot holds an image whose magic number, bounds, zero bytes and CRC-32 are right.
+    fn is_intact(&mut self, slot: Slot) -> bool;
+
+    /// Returns the security epoch in the header of an intact image.
+    fn epoch(&mut self, slot: Slot) -> u16;
+
+    /// Checks that the image in a slot is genuine: for this board and this slot, not below the floor, with the right
+    /// hash and signature.
+    ///
+    /// # Errors
+    ///
+    /// What is wrong with it.
+    fn check(&mut self, slot: Slot, floor: u16) -> Result<(), Reason>;
+
+    /// Writes the boot state.
+    ///
+    /// # Errors
+    ///
+    /// When the flash fails. The record before is still in force.
+    fn write(&mut self, record: Record) -> Result<(), Unwritten>;
+}
+
+/// The boot state could not be written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Unwritten;
+
+/// Why this start takes place, and what was kept over the reset.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Start {
+    /// COMMAND 2 asked for this restart.
+    pub asked: bool,
+    /// SW01 was read as 254 at this power-on, and this is the first start after it.
+    pub switched: bool,
+    /// The slot that SW01 = 254 chose at the last power-on.
+    pub chosen: Option<Slot>,
+}
+
+/// What the loader does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Next {
+    /// Start the image in this slot. `chosen` is kept over the next reset.
+    Run {
+        /// The slot.
+        slot: Slot,
+        /// The slot that SW01 = 254 chose, this one, or none.
+        chosen: Option<Slot>,
+    },
+    /// Reset the part and begin again.
+    Reset,
+    /// No image can be started.
+    Nothing,
+}
+
+/// Decides what a start does. Writes the boot state where it changes.
+///
+/// Nothing is started but an intact image that was found genuine once: *trial* and *confirmed* are reached only through
+/// [`Part::check`].
+pub fn decide(part: &mut impl Part, record: Option<Record>, start: Start) -> Next {
+    let Some(mut record) = record.or_else(|| first(part)) else {
+        return Next::Nothing;
+    };
+    match checked(part, &mut record) {
+        Ok(false) => {}
+        Ok(true) => return Next::Reset,
+        Err(Unwritten) => return preferred(part, &record),
+    }
+    if let Some(slot) = chosen(part, &record, start) {
+        return Next::Run {
+            slot,
+            chosen: Some(slot),
+        };
+    }
+    match on_trial(part, &mut record, start.asked) {
+        Ok(Some(slot)) => Next::Run { slot, chosen: None },
+        Ok(None) | Err(Unwritten) => preferred(part, &record),
+    }
+}
+
+/// Step 1, without a boot state: the first genuine image is confirmed. When the record cannot be written, the same
+/// image is found again at the next start.
+fn first(part: &mut impl Part) -> Option<Record> {
+    let genuine = |slot: &Slot| part.is_intact(*slot) && part.check(*slot, 0).is_ok();
+    let slot = Slot::ALL.into_iter().find(genuine)?;
+    let record = Record {
+        preferred: slot,
+        states: [State::Empty; 2],
+        floor: part.epoch(slot),
+    };
+    let record = record.with(slot, State::Confirmed);
+    let _ = part.write(record);
+    Some(record)
+}
+
+/// Steps 2 and 3: ends a check that was interrupted, and checks a new image. Returns whether an image was checked.
+fn checked(part: &mut impl Part, record: &mut Record) -> Result<bool, Unwritten> {
+    for slot in Slot::ALL {
+        if record.state(slot) == State::Checking {
+            put(part, record, slot, State::Rejected(Reason::Interrupted))?;
+        }
+    }
+    for slot in Slot::ALL {
+        if record.state(slot) == State::New {
+            put(part, record, slot, State::Checking)?;
+            let verdict = match part.check(slot, record.floor) {
+                Ok(()) => State::Trial(0),
+                Err(reason) => State::Rejected(reason),
+            };
+            put(part, record, slot, verdict)?;
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
+/// Step 4: returns the slot that SW01 = 254 chooses.
+fn chosen(part: &mut impl Part, record: &Record, start: Start) -> Option<Slot> {
+    let other = start.switched.then(|| record.preferred.other());
+    let slot = start.chosen.or(other)?;
+    let may = record.state(slot) == State::Confirmed
+        && part.is_intact(slot)
+        && part.epoch(slot) >= record.floor;
+    may.then_some(slot)
+}
+
+/// Step 5: returns the slot with an image on trial. The trial is counted before the image starts.
+fn on_trial(
+    part: &mut impl Part,
+    record: &mut Record,
+    asked: bool,
+) -> Result<Option<Slot>, Unwritten> {
+    for slot in Slot::ALL {
+        let State::Trial(starts) = record.state(slot) else {
+            continue;
+        };
+        if !part.is_intact(slot) {
+            put(part, record, slot, State::Rejected(Reason::Crc))?;
+        } else if starts >= TRIALS {
+            put(part, record, slot, State::Rejected(Reason::NotConfirmed))?;
+        } else {
+            if !asked {
+                put(part, record, slot, State::Trial(starts + 1))?;
+            }
+            return Ok(Some(slot));
+        }
+    }
+    Ok(None)
+}
+
+/// Steps 6 and 7: the preferred slot, else the other one, whatever its epoch.
+fn preferred(part: &mut impl Part, record: &Record) -> Next {
+    let slots = [record.preferred, record.preferred.other()];
+    let may = |slot: &Slot| record.state(*slot) == State::Confirmed && part.is_intact(*slot);
+    match slots.into_iter().find(may) {
+        Some(slot) => Next::Run { slot, chosen: None },
+        None => Next::Nothing,
+    }
+}
+
+fn put(
+    part: &mut impl Part,
+    record: &mut Record,
+    slot: Slot,
+    state: State,
+) -> Result<(), Unwritten> {
+    let changed = record.with(slot, state);
+    part.write(changed)?;
+    *record = changed;
+    Ok(())
+}

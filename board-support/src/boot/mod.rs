@@ -1,0 +1,201 @@
+//! The boot state: which image each slot holds, and which one is started.
+//!
+//! A unit runs from one of two slots, and an update is written into the other one. [`Record`] is the whole state;
+//! [`journal`] keeps it in two pages of flash. [`loader`] has the decisions of the loader and [`commands`] those of the
+//! application. Both are this one module, and its tests walk through every state, every event, and a power cut
+//! between any two writes.
+//!
+//! ```text
+//!           0xB001              0xB002            loader             loader, at a start       0xB003
+//!   any ─────────────> receiving ──────> new ─────────────> checking ────────────────> trial ──────> confirmed
+//!                          ▲                                   │                         │
+//!                          │ 0xB001                            ▼                         ▼
+//!                          └─────────────────────────────── rejected (why) <─────────────┘
+//! ```
+
+pub mod commands;
+pub mod header;
+pub mod journal;
+pub mod loader;
+
+#[cfg(test)]
+mod walk;
+
+/// One of the two places for an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Slot {
+    /// At the lower address.
+    A,
+    /// At the higher address.
+    B,
+}
+
+impl Slot {
+    /// Both slots, A first.
+    pub const ALL: [Self; 2] = [Self::A, Self::B];
+
+    /// Returns the other slot.
+    #[must_use]
+    pub const fn other(self) -> Self {
+        match self {
+            Self::A => Self::B,
+            Self::B => Self::A,
+        }
+    }
+}
+
+/// Why an image was rejected. The codes are those of record 1 of file 2.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Reason {
+    /// The magic number or the bytes that must be zero.
+    Magic = 1,
+    /// The image is for another board.
+    Board = 2,
+    /// The image is linked for another address.
+    Address = 3,
+    /// The length is no multiple of 4, or outside the slot.
+    Length = 4,
+    /// The security epoch is below the floor.
+    Epoch = 5,
+    /// The CRC-32.
+    Crc = 6,
+    /// The SHA-512 of the application.
+    Hash = 7,
+    /// The signature.
+    Signature = 8,
+    /// The check was interrupted.
+    Interrupted = 9,
+    /// The image was started three times, and nobody confirmed it.
+    NotConfirmed = 10,
+}
+
+impl Reason {
+    const ALL: [Self; 10] = [
+        Self::Magic,
+        Self::Board,
+        Self::Address,
+        Self::Length,
+        Self::Epoch,
+        Self::Crc,
+        Self::Hash,
+        Self::Signature,
+        Self::Interrupted,
+        Self::NotConfirmed,
+    ];
+}
+
+/// Number of starts that an image has in which to be confirmed. A start that was asked for does not count.
+pub const TRIALS: u8 = 2;
+
+/// What a slot holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum State {
+    /// Nothing that counts.
+    Empty,
+    /// Blocks of an update. After a restart this counts as empty.
+    Receiving,
+    /// A whole image, which the loader checks at the next start.
+    New,
+    /// An image that the loader is checking.
+    Checking,
+    /// A genuine image that was started this many times, and is not confirmed.
+    Trial(u8),
+    /// A genuine image that serves.
+    Confirmed,
+    /// An image that is not started.
+    Rejected(Reason),
+}
+
+impl State {
+    /// Returns the code, as in record 0 of file 2, and the number of starts or the reason, as in record 1.
+    #[must_use]
+    pub const fn code(self) -> (u8, u8) {
+        match self {
+            Self::Empty => (0, 0),
+            Self::Receiving => (1, 0),
+            Self::New => (2, 0),
+            Self::Checking => (3, 0),
+            Self::Trial(starts) => (4, starts),
+            Self::Confirmed => (5, 0),
+            Self::Rejected(reason) => (6, reason as u8),
+        }
+    }
+
+    /// Returns the state with this code and detail, or `None` if there is none.
+    #[must_use]
+    pub fn from_code(code: u8, detail: u8) -> Option<Self> {
+        Some(match (code, detail) {
+            (0, 0) => Self::Empty,
+            (1, 0) => Self::Receiving,
+            (2, 0) => Self::New,
+            (3, 0) => Self::Checking,
+            (4, starts @ 0..=TRIALS) => Self::Trial(starts),
+            (5, 0) => Self::Confirmed,
+            (6, code) => {
+                let mut reasons = Reason::ALL.into_iter();
+                Self::Rejected(reasons.find(|reason| *reason as u8 == code)?)
+            }
+            _ => return None,
+        })
+    }
+
+    /// Returns whether an image in this state may be started, if its CRC-32 is right.
+    #[must_use]
+    pub const fn may_start(self) -> bool {
+        matches!(self, Self::Trial(_) | Self::Confirmed)
+    }
+}
+
+/// The whole boot state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Record {
+    /// The slot that is started when nothing else is asked for.
+    pub preferred: Slot,
+    /// The states of slots A and B.
+    pub states: [State; 2],
+    /// The lowest security epoch of an image that becomes new.
+    pub floor: u16,
+}
+
+impl Record {
+    /// Returns the state of a slot.
+    #[must_use]
+    pub const fn state(&self, slot: Slot) -> State {
+        let [a, b] = self.states;
+        match slot {
+            Slot::A => a,
+            Slot::B => b,
+        }
+    }
+
+    /// Returns the record with another state of a slot.
+    #[must_use]
+    pub const fn with(mut self, slot: Slot, state: State) -> Self {
+        let [a, b] = &mut self.states;
+        *match slot {
+            Slot::A => a,
+            Slot::B => b,
+        } = state;
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_state_has_its_own_code_and_other_codes_have_no_state() {
+        let mut found = 0;
+        for code in 0..=u8::MAX {
+            for detail in 0..=u8::MAX {
+                if let Some(state) = State::from_code(code, detail) {
+                    assert_eq!(state.code(), (code, detail));
+                    found += 1;
+                }
+            }
+        }
+        // Five states alone, a trial by its starts, a rejection by its reason.
+        assert_eq!(found, 5 + 3 + 10);
+    }
+}
