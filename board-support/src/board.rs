@@ -26,6 +26,9 @@ use crate::{
 const WATCHDOG: u8 = 1 << 2;
 const POWER_ON: u8 = 1 << 4;
 
+/// Whether the application is linked for a slot behind the loader.
+const HAS_LOADER: bool = cfg!(any(feature = "slot-a", feature = "slot-b"));
+
 /// The board's devices.
 pub struct Board {
     /// Clock source of the core.
@@ -97,32 +100,24 @@ impl LineOff {
 pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
     vectors::move_to_ram(scb);
     let mut rcc = device.RCC;
-    let reset_cause = take_reset_cause(&rcc);
+    // Behind the loader, it has read and cleared the flags.
+    let reset_cause = if HAS_LOADER {
+        kept::take_cause()
+    } else {
+        take_reset_cause(&rcc)
+    };
     let watchdog = Watchdog::start(device.IWDG, &device.DBGMCU);
     let kept = kept::at_start(reset_cause & (WATCHDOG | POWER_ON) == WATCHDOG);
     let faults = kept.record();
     let crystal = faults.crystal_faults < CRYSTAL_FAULTS;
     let clock = clock::start(&rcc, &device.FLASH, crystal);
 
-    // Every pin floats, as after a reset of the chip.
-    pac::GPIOA::enable(&mut rcc);
-    pac::GPIOB::enable(&mut rcc);
-    pac::GPIOC::enable(&mut rcc);
-    pac::GPIOA::reset(&mut rcc);
-    pac::GPIOB::reset(&mut rcc);
-    pac::GPIOC::reset(&mut rcc);
+    set_up_ports(&mut rcc);
 
     // Configure the driver-enable pin first, so that nothing is sent on the bus.
     rs485::set_up_pins();
 
-    // SW01: one side of each switch is connected to ground.
-    BOARD.switch.iter().for_each(|pin| pin.pull_up());
-    cortex_m::asm::delay(DIP_SETTLE_CYCLES);
-    let dip = kept.dip().unwrap_or_else(|| {
-        let dip = dip::stable(read_dip, || wait::wait_us(DIP_POLL_US, clock.core_mhz()));
-        kept::keep_dip(dip);
-        dip
-    });
+    let dip = kept.dip().unwrap_or_else(|| switch(clock.core_mhz()));
 
     // PC13 must not be faster than 2 MHz nor drive more than 3 mA (DS5319 table 5, notes).
     let leds = [
@@ -167,14 +162,30 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
     }
 }
 
-/// Reads SW01 now, without waiting for a stable value.
-fn read_dip() -> u8 {
-    dip::number(&BOARD.switch, Pin::is_high)
+/// Turns the clocks of the ports on. Every pin floats, as after a reset of the chip, but those of SW01 are pulled up.
+pub(crate) fn set_up_ports(rcc: &mut pac::RCC) {
+    pac::GPIOA::enable(rcc);
+    pac::GPIOB::enable(rcc);
+    pac::GPIOC::enable(rcc);
+    pac::GPIOA::reset(rcc);
+    pac::GPIOB::reset(rcc);
+    pac::GPIOC::reset(rcc);
+    // One side of each switch is connected to ground.
+    BOARD.switch.iter().for_each(|pin| pin.pull_up());
+}
+
+/// Reads SW01 and keeps it, with a core clock of `mhz` MHz. The ports must be set up.
+pub(crate) fn switch(mhz: u8) -> u8 {
+    cortex_m::asm::delay(DIP_SETTLE_CYCLES);
+    let read = || dip::number(&BOARD.switch, Pin::is_high);
+    let dip = dip::stable(read, || wait::wait_us(DIP_POLL_US, mhz));
+    kept::keep_dip(dip);
+    dip
 }
 
 /// Reads and clears the reset flags, so that the next start sees only its own flags. After a power-on clears the kept
 /// region first; otherwise another reset in between would hide the power-on.
-fn take_reset_cause(rcc: &pac::RCC) -> u8 {
+pub(crate) fn take_reset_cause(rcc: &pac::RCC) -> u8 {
     // The six most significant bits, from LPWRRSTF down to PINRSTF (RM0008 7.3.10).
     let cause = rcc.csr().read().bits().reverse_bits() as u8 & 0b11_1111;
     if cause & POWER_ON != 0 {

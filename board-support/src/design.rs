@@ -103,6 +103,20 @@ pub const WATCHDOG_START_DIVIDER: u32 = 16;
 /// The watchdog's reload value during start-up.
 pub const WATCHDOG_START_RELOAD: u16 = (WATCHDOG_START_MS * 40 / WATCHDOG_START_DIVIDER - 1) as u16;
 
+/// Core clock of the loader, in MHz: the internal oscillator, as after a reset.
+pub const LOADER_MHZ: u8 = 8;
+
+/// Time-out of the independent watchdog in the loader, in milliseconds with an LSI of 40 kHz: really 5.3 to 10.7 s. The
+/// check of a signature takes up to 4 s.
+pub const WATCHDOG_LOADER_MS: u32 = 8_000;
+
+/// Divider of the watchdog's clock in the loader: steps of 3.2 ms.
+pub const WATCHDOG_LOADER_DIVIDER: u32 = 128;
+
+/// The watchdog's reload value in the loader.
+pub const WATCHDOG_LOADER_RELOAD: u16 =
+    (WATCHDOG_LOADER_MS * 40 / WATCHDOG_LOADER_DIVIDER - 1) as u16;
+
 /// Divider of the watchdog's clock, the LSI (RM0008 19.4.2): steps of 0.2 ms.
 pub const WATCHDOG_DIVIDER: u32 = 8;
 
@@ -131,6 +145,7 @@ const _: () = {
         "the watchdog counts with 12 bits"
     );
     assert!(WATCHDOG_START_MS * 40 / WATCHDOG_START_DIVIDER <= 4096);
+    assert!(WATCHDOG_LOADER_MS * 40 / WATCHDOG_LOADER_DIVIDER <= 4096);
     assert!(I2C_HZ > 100_000 && I2C_HZ <= 400_000);
     assert!(I2C_STEP_US > 2 * 9 * 1_000_000 / I2C_HZ);
 };

@@ -34,7 +34,7 @@ pub enum FlashError {
     Failed,
 }
 
-/// The store's pages and the flash controller.
+/// The flash controller, and as [`Pages`] the pages of the store.
 pub struct Flash {
     flash: pac::FLASH,
     power: pac::PWR,
@@ -103,6 +103,12 @@ impl Flash {
         };
         flash.set_up_detector();
         flash
+    }
+
+    /// Returns the controller, to set the wait states.
+    #[cfg(feature = "loader")]
+    pub(crate) fn controller(&self) -> &pac::FLASH {
+        &self.flash
     }
 
     fn set_up_detector(&self) {
@@ -201,6 +207,9 @@ impl Flash {
 unsafe extern "C" {
     /// The first page of the store. The second one follows.
     static _store: u8;
+    /// The first page of the boot state. The second one follows.
+    #[cfg(feature = "loader")]
+    static _boot: u8;
     /// Its address is the number of bytes of a page.
     static _page_bytes: u8;
 }
@@ -209,37 +218,91 @@ fn page_bytes() -> u32 {
     &raw const _page_bytes as u32
 }
 
-fn address(page: Page) -> u32 {
-    let first = &raw const _store as u32;
+/// Returns the address of a page of the two that begin at `first`.
+fn address(first: u32, page: Page) -> u32 {
     match page {
         Page::First => first,
         Page::Second => first + page_bytes(),
     }
 }
 
-impl Pages for Flash {
-    type Error = FlashError;
-
-    fn page(&self, page: Page) -> &[u8] {
+impl Flash {
+    fn page_of(&self, first: u32, page: Page) -> &[u8] {
+        let address = address(first, page) as *const u8;
         // SAFETY: a page of flash is always readable, as bytes. Only the `&mut` methods of this value change it,
         // and the borrow prevents calls of those. They end with a barrier that the compiler treats as a write to
         // all memory.
-        unsafe { slice::from_raw_parts(address(page) as *const u8, page_bytes() as usize) }
+        unsafe { slice::from_raw_parts(address, page_bytes() as usize) }
     }
 
-    fn program(&mut self, page: Page, offset: usize, half: u16) -> Result<(), FlashError> {
+    /// Programs a half-word. `first` must be the first page of the store or of the boot state.
+    fn program_in(
+        &mut self,
+        first: u32,
+        page: Page,
+        offset: usize,
+        half: u16,
+    ) -> Result<(), FlashError> {
         let offset = offset as u32;
         if offset >= page_bytes() || !offset.is_multiple_of(2) {
             return Err(FlashError::Failed);
         }
-        let place = (address(page) + offset) as *mut u16;
-        // SAFETY: the half-word belongs to the store, and no reference to it is alive (`&mut self`).
+        let place = (address(first, page) + offset) as *mut u16;
+        // SAFETY: the half-word belongs to these pages, and no reference to it is alive (`&mut self`).
         unsafe { self.operate(Operation::Program { place, half }) }
     }
 
-    fn erase(&mut self, page: Page) -> Result<(), FlashError> {
-        let page = address(page);
-        // SAFETY: the page belongs to the store and contains no code.
+    /// Erases a page. `first` as for [`Self::program_in`].
+    fn erase_of(&mut self, first: u32, page: Page) -> Result<(), FlashError> {
+        let page = address(first, page);
+        // SAFETY: the page contains no code.
         unsafe { self.operate(Operation::Erase { page }) }
+    }
+}
+
+fn store() -> u32 {
+    &raw const _store as u32
+}
+
+/// The pages of the store.
+impl Pages for Flash {
+    type Error = FlashError;
+
+    fn page(&self, page: Page) -> &[u8] {
+        self.page_of(store(), page)
+    }
+
+    fn program(&mut self, page: Page, offset: usize, half: u16) -> Result<(), FlashError> {
+        self.program_in(store(), page, offset, half)
+    }
+
+    fn erase(&mut self, page: Page) -> Result<(), FlashError> {
+        self.erase_of(store(), page)
+    }
+}
+
+/// The pages of the boot state.
+#[cfg(feature = "loader")]
+pub struct BootPages<'a>(pub(crate) &'a mut Flash);
+
+#[cfg(feature = "loader")]
+fn boot() -> u32 {
+    &raw const _boot as u32
+}
+
+#[cfg(feature = "loader")]
+impl Pages for BootPages<'_> {
+    type Error = FlashError;
+
+    fn page(&self, page: Page) -> &[u8] {
+        self.0.page_of(boot(), page)
+    }
+
+    fn program(&mut self, page: Page, offset: usize, half: u16) -> Result<(), FlashError> {
+        self.0.program_in(boot(), page, offset, half)
+    }
+
+    fn erase(&mut self, page: Page) -> Result<(), FlashError> {
+        self.0.erase_of(boot(), page)
     }
 }

@@ -8,8 +8,6 @@
 #![no_std]
 
 pub mod boards;
-pub mod boot;
-mod crc32;
 pub mod design;
 pub mod fault;
 pub mod gap;
@@ -27,12 +25,16 @@ mod adc;
 pub mod board;
 #[cfg(target_os = "none")]
 mod clock;
+#[cfg(all(target_os = "none", feature = "loader"))]
+mod crc_unit;
 #[cfg(any(target_os = "none", test))]
 mod dip;
 #[cfg(target_os = "none")]
 pub mod flash;
 #[cfg(target_os = "none")]
 mod gap_timer;
+#[cfg(all(target_os = "none", feature = "loader"))]
+pub mod loading;
 #[cfg(target_os = "none")]
 mod mem;
 #[cfg(target_os = "none")]

@@ -1,6 +1,6 @@
 //! Measures how much of the stack was never used.
 //!
-//! The stack lies at the bottom of the RAM and grows downwards, with the statics above it (firmware's memory.x). A
+//! The stack lies at the bottom of the RAM and grows downwards, with the statics above it (memory.x). A
 //! stack that is too deep reaches addresses without memory, and the bus reports a fault before the stack can
 //! overwrite a static. This needs no special linker such as flip-link. cortex-m-rt paints the stack before it is
 //! used; words that still hold the paint were never written.

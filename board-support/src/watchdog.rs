@@ -1,7 +1,7 @@
 //! The independent watchdog. It resets the device when it is not refreshed, even when the main clock has stopped.
 //! It runs from the first steps of a start.
 
-use stm32f1xx_hal::pac;
+use stm32f1xx_hal::pac::{self, iwdg::pr::PR as Prescaler};
 
 use crate::{
     design::{WATCHDOG_RELOAD, WATCHDOG_SETTINGS_US, WATCHDOG_START_RELOAD},
@@ -23,16 +23,25 @@ impl Watchdog {
     /// [`WATCHDOG_START_MS`](crate::design::WATCHDOG_START_MS), so that a start that hangs is reset, too. The
     /// watchdog stops while a debugger halts the core.
     pub(crate) fn start(iwdg: pac::IWDG, debug: &pac::DBGMCU) -> Self {
+        Self::started(iwdg, debug, Prescaler::DivideBy16, WATCHDOG_START_RELOAD)
+    }
+
+    /// The same, with the period of the loader, [`WATCHDOG_LOADER_MS`](crate::design::WATCHDOG_LOADER_MS).
+    #[cfg(feature = "loader")]
+    pub(crate) fn start_loader(iwdg: pac::IWDG, debug: &pac::DBGMCU) -> Self {
+        let reload = crate::design::WATCHDOG_LOADER_RELOAD;
+        Self::started(iwdg, debug, Prescaler::DivideBy128, reload)
+    }
+
+    #[inline(always)]
+    fn started(iwdg: pac::IWDG, debug: &pac::DBGMCU, divider: Prescaler, reload: u16) -> Self {
         debug.cr().modify(|_, w| w.dbg_iwdg_stop().set_bit());
         let mut watchdog = Self { iwdg };
         // Starting the watchdog also turns the LSI on, which is needed to accept the settings.
         watchdog.write_key(START);
         watchdog.write_key(OPEN);
-        watchdog.iwdg.pr().write(|w| w.pr().divide_by16());
-        watchdog
-            .iwdg
-            .rlr()
-            .write(|w| w.rl().set(WATCHDOG_START_RELOAD));
+        watchdog.iwdg.pr().write(|w| w.pr().variant(divider));
+        watchdog.iwdg.rlr().write(|w| w.rl().set(reload));
         watchdog.reload_when_set();
         watchdog
     }

@@ -4,7 +4,8 @@ use core::fmt;
 use core::ops::Range;
 use core::str::FromStr;
 
-use crate::part::{self, KIB, Part, STM32F103C8, STM32F103CB, STM32F103RC};
+use crate::layout::{Layout, TwoPages};
+use crate::part::{KIB, Part, STM32F103C8, STM32F103CB, STM32F103RC};
 use crate::points;
 
 /// A board that the firmware is built for.
@@ -20,25 +21,8 @@ pub struct Board {
     pub first_port: u16,
     /// Number of consecutive ports with a slot, 1 to 8. All other ports have none.
     pub slots: u16,
-    /// Flash pages that store the configuration.
-    pub store: StorePages,
-}
-
-/// The two flash pages that hold the configuration. Each can be erased separately.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct StorePages {
-    /// Address of the first page. The second one follows.
-    pub first: u32,
-    /// Bytes of a page, the smallest unit that can be erased.
-    pub bytes: u32,
-}
-
-impl StorePages {
-    /// Returns the addresses of both pages.
-    #[must_use]
-    pub const fn addresses(self) -> [u32; 2] {
-        [self.first, self.first + self.bytes]
-    }
+    /// Flash pages that store the configuration, while the application runs without a loader.
+    pub store: TwoPages,
 }
 
 /// What the image of a board is linked for, and what it may use.
@@ -115,10 +99,7 @@ impl Row {
             model: self.model,
             first_port: self.first_port,
             slots: self.slots,
-            store: StorePages {
-                first: part::FLASH_BASE + part.flash - 2 * part.page,
-                bytes: part.page,
-            },
+            store: TwoPages::before(part.flash, &part),
         }
     }
 }
@@ -148,6 +129,12 @@ impl Board {
     pub fn memory(&self) -> &'static Memory {
         let row = const { &ROWS }.iter().find(|row| row.code == self.code);
         &row.expect("every board comes from a row").memory
+    }
+
+    /// Returns where loader, images, boot state and configuration are in the flash of the board's part.
+    #[must_use]
+    pub fn layout(&self) -> Layout {
+        Layout::of(&self.memory().part)
     }
 
     /// Returns the board with this code in register BOARD.

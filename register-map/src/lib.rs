@@ -32,6 +32,7 @@ pub mod configuration;
 pub mod counters;
 pub mod fault;
 mod kind;
+pub mod layout;
 pub mod limits;
 mod module;
 pub mod part;
@@ -41,6 +42,7 @@ pub mod radio;
 pub mod record;
 mod rule;
 pub mod state;
+pub mod update;
 mod value;
 mod values;
 

@@ -1,5 +1,5 @@
-//! `cargo xtask build`: the release image, as an ELF file for a debugger or the simulator and as a .bin for a
-//! programmer.
+//! `cargo xtask build`: the release image, the loader, and the applications for the slots behind it, each as an ELF file
+//! for a debugger or the simulator and as a .bin for a programmer.
 
 use std::path::{Path, PathBuf};
 
@@ -8,6 +8,7 @@ use cargo_metadata::PackageId;
 use fs_err as fs;
 use register_map::Board;
 use register_map::board::MODIO_02;
+use register_map::update::Slot;
 
 use crate::error::usage;
 use crate::image;
@@ -57,9 +58,20 @@ impl Given {
 
 /// `cargo xtask build`.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
-    let elf = image(workspace, options.board)?;
-    say!("{}\n{}", elf.display(), elf.with_extension("bin").display());
+    for elf in all(workspace, options.board)? {
+        say!("{}\n{}", elf.display(), elf.with_extension("bin").display());
+    }
     Ok(())
+}
+
+/// Builds every program of a board, and returns their ELF files: the image that runs alone, the loader, and the
+/// application for both slots.
+pub fn all(workspace: &mut Workspace, board: &Board) -> Result<[PathBuf; 4]> {
+    let [a, b] = Slot::ALL;
+    let (a, b) = (slot(workspace, board, a)?, slot(workspace, board, b)?);
+    // Last, because the applications for the slots have the same name until they are copied.
+    let image = image(workspace, board)?;
+    Ok([image, loader(workspace, board)?, a, b])
 }
 
 /// Builds the image, and returns its ELF file, with symbols and debug information.
@@ -67,23 +79,53 @@ pub fn image(workspace: &mut Workspace, board: &Board) -> Result<PathBuf> {
     Ok(linked(workspace, board, None)?.0)
 }
 
-/// Builds the image, and checks that it cannot panic and that its code in RAM needs no flash. Writes the flash from
-/// 0x0800_0000 on to a .bin, and the linker's map to a file. Returns the ELF file, and the packages that were compiled
-/// for the target.
+/// Builds the loader, and returns its ELF file.
+pub fn loader(workspace: &mut Workspace, board: &Board) -> Result<PathBuf> {
+    Ok(program(workspace, board, ["loader", "loader", board.name], None)?.0)
+}
+
+/// Builds the application for a slot behind the loader, and returns its ELF file.
+pub fn slot(workspace: &mut Workspace, board: &Board, slot: Slot) -> Result<PathBuf> {
+    let letter = match slot {
+        Slot::A => "a",
+        Slot::B => "b",
+    };
+    let features = format!("{board},slot-{letter}");
+    let (elf, _) = program(workspace, board, ["firmware", "modio", &features], None)?;
+    // The next build of the application has the same name.
+    let kept = elf.with_file_name(format!("modio-{letter}"));
+    fs::copy(&elf, &kept)?;
+    fs::rename(elf.with_extension("bin"), kept.with_extension("bin"))?;
+    Ok(kept)
+}
+
+/// Builds the image that runs without a loader, and writes the linker's map to a file. Returns the ELF file, and the
+/// packages that were compiled for the target.
 pub fn linked(
     workspace: &mut Workspace,
     board: &Board,
     map: Option<&Path>,
 ) -> Result<(PathBuf, Vec<PackageId>)> {
+    program(workspace, board, ["firmware", "modio", board.name], map)
+}
+
+/// Builds a program for a board: its package, its name, and the features. Checks that it cannot panic and that its code in
+/// RAM needs no flash. Writes the flash from 0x0800_0000 on to a .bin.
+fn program(
+    workspace: &mut Workspace,
+    board: &Board,
+    [package, name, features]: [&str; 3],
+    map: Option<&Path>,
+) -> Result<(PathBuf, Vec<PackageId>)> {
     let target = target(&workspace.target, board);
     let mut cargo = workspace.target_cargo("build")?;
-    cargo.args(["--profile", PROFILE, "--package", "firmware"]);
-    cargo.args(["--bin", "modio", "--features", board.name]);
+    cargo.args(["--profile", PROFILE, "--package", package]);
+    cargo.args(["--bin", name, "--features", features]);
     cargo.arg("--target-dir").arg(&target);
     // The variable that firmware/build.rs reads.
     cargo.envs(map.map(|map| ("MODIO_MAP", map)));
     let artifacts = workspace::artifacts(&mut cargo)?;
-    let elf = workspace::executable(&artifacts, "modio")?;
+    let elf = workspace::executable(&artifacts, name)?;
     let bytes = image::read(&elf)?;
     let flash = image::flat(&bytes, board.memory().part.flash)?;
     image::check(&bytes)?;

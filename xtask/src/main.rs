@@ -37,6 +37,7 @@ mod ordinary;
 mod peers;
 mod python;
 mod renode;
+mod signed;
 mod sim;
 mod size;
 mod soak;
@@ -56,8 +57,10 @@ struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Command {
-    /// Build the release image: ELF and .bin
+    /// Build the release image, the loader, and the application for both slots: ELF and .bin
     Build(build::Options),
+    /// Build the images for both slots behind the loader, sign them, and write the file of an update
+    Image(signed::Options),
     /// Write the image into a board with probe-rs, verify and start it
     Flash(debug::Options),
     /// Build the image, run it on the board at the debug probe, or without one in the simulator, and show its log
@@ -134,6 +137,7 @@ fn run(cli: Cli) -> Result<()> {
     let workspace = &mut workspace;
     match cli.command {
         Command::Build(options) => build::run(workspace, &options),
+        Command::Image(options) => signed::run(workspace, &options),
         Command::Flash(options) => debug::flash(workspace, &options),
         Command::Run(options) => debug::run(workspace, &options),
         Command::Attach(options) => debug::attach(workspace, &options),

@@ -16,13 +16,19 @@ use crate::python::{masters, page};
 use crate::renode::checks;
 use crate::steps::{self, Done};
 use crate::workspace::{ALL, SUITE, Workspace};
-use crate::{adding, bench, build, command, fuzz, group, ordinary, peers, size, table};
+use crate::{adding, bench, build, command, fuzz, group, ordinary, peers, signed, size, table};
 
 /// The variable with the corner of the part for the tests of the image.
 pub const CORNER: &str = "MODIO_CORNER";
 
-/// The packages of the image.
-const TARGET_PACKAGES: &str = "firmware board-support modio-drivers modbus-server register-map";
+/// The programs for the microcontroller, each with its packages. They need different features of board-support.
+const PROGRAMS: [(&str, &str); 2] = [
+    (
+        "firmware",
+        "firmware board-support modio-drivers modbus-server register-map",
+    ),
+    ("loader", "loader board-support register-map"),
+];
 
 /// The workspaces of this project.
 const WORKSPACES: [&str; 3] = ["Cargo.toml", fuzz::MANIFEST, peers::MANIFEST];
@@ -62,7 +68,7 @@ const STEPS: [(In, &str, &str, Run); 22] = [
     (Ci, "doc-host", "documentation, host", Once(doc_host)),
     (Ci, "doc", "documentation, target", Each(doc_target)),
     (Host, "unit", "tests on the host", Once(unit)),
-    (Host, "image", "release image, no panics", Each(image)),
+    (Host, "image", "release images, no panics", Each(image)),
     (Host, "size", "size of the image", Each(size::check)),
     (Test, "sim", "tests of the images in simulation", Once(sim)),
     (Test, "conformance", "the conformance suite", Once(suite)),
@@ -204,20 +210,28 @@ fn lint_host(workspace: &mut Workspace) -> Result<()> {
     deny_warnings(cargo)
 }
 
-/// Returns cargo with the options that compile code for a board.
-fn for_target(workspace: &mut Workspace, subcommand: &str, board: &Board) -> Result<Command> {
+/// Returns cargo with the options that compile a program for a board.
+fn for_target(
+    workspace: &mut Workspace,
+    subcommand: &str,
+    program: &str,
+    board: &Board,
+) -> Result<Command> {
     let mut cargo = workspace.target_cargo(subcommand)?;
     cargo.args(["--profile", build::PROFILE]);
-    cargo.args(["--features", &format!("firmware/{board}")]);
+    cargo.args(["--features", &format!("{program}/{board}")]);
     Ok(cargo)
 }
 
 fn lint_target(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
-    let mut cargo = for_target(workspace, "clippy", board)?;
-    for package in TARGET_PACKAGES.split(' ') {
-        cargo.args(["--package", package]);
+    for (program, packages) in PROGRAMS {
+        let mut cargo = for_target(workspace, "clippy", program, board)?;
+        for package in packages.split(' ') {
+            cargo.args(["--package", package]);
+        }
+        deny_warnings(cargo)?;
     }
-    deny_warnings(cargo)
+    Ok(())
 }
 
 fn lint_fuzz(workspace: &mut Workspace) -> Result<()> {
@@ -244,9 +258,12 @@ fn doc_host(workspace: &mut Workspace) -> Result<()> {
 }
 
 fn doc_target(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
-    let mut cargo = for_target(workspace, "doc", board)?;
-    cargo.args(["--package", "board-support", "--package", "firmware"]);
-    documentation(cargo)
+    for (program, _) in PROGRAMS {
+        let mut cargo = for_target(workspace, "doc", program, board)?;
+        cargo.args(["--package", "board-support", "--package", program]);
+        documentation(cargo)?;
+    }
+    Ok(())
 }
 
 fn unit(workspace: &mut Workspace) -> Result<()> {
@@ -260,7 +277,7 @@ fn unit(workspace: &mut Workspace) -> Result<()> {
 }
 
 fn image(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
-    build::image(workspace, board).map(drop)
+    build::all(workspace, board).map(drop)
 }
 
 fn sim(workspace: &mut Workspace) -> Result<()> {
@@ -314,6 +331,8 @@ pub fn simulated(
     let ordinary = ordinary::words()?;
     let modio_02 = build::image(workspace, &MODIO_02)?;
     let modio_08 = build::image(workspace, &MODIO_08)?;
+    let loader = build::loader(workspace, &MODIO_02)?;
+    let slots = signed::images(workspace, &signed::Options::of(&MODIO_02))?;
     let simulator = workspace.simulator()?;
     let tests = |list: &[&str]| {
         let mut cargo = workspace.cargo("test");
@@ -328,6 +347,8 @@ pub fn simulated(
         cargo.env(CORNER, "nominal").envs(variables.iter().copied());
         cargo.env("MODIO_ELF", &modio_02);
         cargo.env("MODIO_ELF_08", &modio_08);
+        cargo.env("MODIO_LOADER", &loader);
+        cargo.envs(["MODIO_A", "MODIO_B"].into_iter().zip(&slots));
         // Tests of one package do not know the path of another package's program.
         cargo.env("MODIO_SIM", &simulator);
         cargo

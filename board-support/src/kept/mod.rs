@@ -19,17 +19,21 @@ use crate::fault::TASKS;
 
 #[cfg(any(target_os = "none", test))]
 mod live;
+#[cfg(all(target_os = "none", feature = "loader"))]
+mod loading;
 #[cfg(target_os = "none")]
 mod region;
 #[cfg(any(target_os = "none", test))]
 mod sealed;
 
+#[cfg(all(target_os = "none", feature = "loader"))]
+pub(crate) use loading::{at_loading, keep_chosen, keep_switched};
 #[cfg(target_os = "none")]
-pub(crate) use region::{at_start, forget, keep_dip};
+pub(crate) use region::{at_start, forget, keep_dip, take_cause};
 #[cfg(target_os = "none")]
 pub use region::{keep_asked, keep_pulses, keep_saves, keep_uptime, marks, note, pulses};
 
-/// Words of one copy of the sealed part: 10 words, room for fields to come, and the CRC-32.
+/// Words of one copy of the sealed part: 11 words, room for fields to come, and the CRC-32.
 const COPY: usize = 16;
 /// First word of the seconds since power-on.
 const UPTIME: usize = 2 * COPY;

@@ -13,7 +13,7 @@ use core::{
 
 use super::{
     COPY, MARKS, PULSES, UPTIME, WORDS, live,
-    sealed::{self, ASKED, DIP, FLAGS, FRESH, HAS_DIP, SAVES, STARTED, Sealed},
+    sealed::{self, ASKED, CAUSE, DIP, FLAGS, FRESH, HAS_DIP, SAVES, STARTED, Sealed, UNSEEN},
 };
 use crate::fault::{ENDED, Fault, Kind, TASKS};
 
@@ -33,7 +33,7 @@ fn word(at: usize) -> *mut u32 {
     unsafe { _kept.0.get().cast::<u32>().add(at % WORDS) }
 }
 
-fn read(at: usize) -> u32 {
+pub(super) fn read(at: usize) -> u32 {
     // SAFETY: a word of RAM, which may hold any value. Volatile, because the value may be older than this start.
     unsafe { ptr::read_volatile(word(at)) }
 }
@@ -56,7 +56,7 @@ fn set_live(at: usize, number: u32) {
 /// Changes the sealed part: notes a fault, if there is one, and then replaces the bits of `mask` in a word. Without a
 /// valid copy clears the rest of the region first.
 #[inline(never)]
-fn update(fault: Option<&Fault>, word: usize, mask: u32, bits: u32) {
+pub(super) fn update(fault: Option<&Fault>, word: usize, mask: u32, bits: u32) {
     let mut sealed = Sealed::after_power_on();
     let in_force = sealed.load(read);
     if in_force.is_none() {
@@ -94,6 +94,13 @@ pub(crate) fn at_start(by_watchdog: bool) -> Sealed {
     marks.for_each(|mark| mark.store(0, Ordering::Relaxed));
     // Both copies are valid now.
     Sealed::copy(0, read)
+}
+
+/// Returns the reset flags that the loader kept, once.
+pub(crate) fn take_cause() -> u8 {
+    let cause = read(CAUSE);
+    update(None, CAUSE, UNSEEN, 0);
+    cause as u8 & 0b11_1111
 }
 
 /// Notes a fault. For panic and fault handlers. Only the first fault since the start is noted.

@@ -3,10 +3,7 @@
 use core::array;
 
 use super::COPY;
-use crate::{
-    crc32::crc32,
-    fault::{Fault, FaultRecord, Kind},
-};
+use crate::fault::{Fault, FaultRecord, Kind};
 
 /// The first word: the magic (upper half), the version of the layout, and the length in words (lowest byte).
 const HEAD: u32 = 0x6B70 << 16 | 1 << 8 | COPY as u32;
@@ -22,6 +19,9 @@ const UPTIME: usize = 7;
 pub(super) const FLAGS: usize = 8;
 /// Word of the seconds from power-on to the last start.
 pub(super) const STARTED: usize = 9;
+/// Word of the reset flags that the loader found (bits 0 to 5), and whether the application has not seen them yet.
+#[cfg(target_os = "none")]
+pub(super) const CAUSE: usize = 10;
 
 /// SW01.
 pub(super) const DIP: u32 = 0xFF;
@@ -30,7 +30,10 @@ pub(super) const HAS_DIP: u32 = 1 << 8;
 /// This restart was asked for by COMMAND 2.
 #[cfg(target_os = "none")]
 pub(super) const ASKED: u32 = 1 << 9;
-/// The fault was noted since the last start.
+/// The application has not seen the reset flags in [`CAUSE`] yet.
+#[cfg(target_os = "none")]
+pub(super) const UNSEEN: u32 = 1 << 8;
+/// The fault was noted since the last start. Bits 11 to 13 are the loader's.
 pub(super) const FRESH: u32 = 1 << 10;
 /// The number of saves left.
 pub(super) const SAVES: u32 = 0x00FF_0000;
@@ -73,13 +76,13 @@ impl Sealed {
 
     fn is_valid(&self) -> bool {
         // The CRC-32 of words and their CRC-32 is 0.
-        self.0[0] == HEAD && crc32(&self.0) == 0
+        self.0[0] == HEAD && crc(&self.0) == 0
     }
 
     /// Seals the content and writes both copies, that of number `in_force` last.
     pub(super) fn store(&mut self, in_force: usize, mut write: impl FnMut(usize, u32)) {
         let [words @ .., seal] = &mut self.0;
-        *seal = crc32(words);
+        *seal = crc(words);
         let first = COPY - COPY * in_force;
         for at in first..first + 2 * COPY {
             write(at % (2 * COPY), self.0[at % COPY]);
@@ -130,6 +133,12 @@ impl Sealed {
         }
     }
 
+    /// Returns the word at an index.
+    #[cfg(all(target_os = "none", feature = "loader"))]
+    pub(super) const fn word(&self, at: usize) -> u32 {
+        self.0[at % COPY]
+    }
+
     /// Returns the number of saves left, 255 after power-on.
     pub(crate) const fn saves(&self) -> u8 {
         (!self.0[FLAGS] >> 16) as u8
@@ -144,6 +153,18 @@ impl Sealed {
 /// Returns the bits of a number of saves left.
 pub(super) const fn saves(left: u8) -> u32 {
     (!left as u32) << 16
+}
+
+/// Returns the CRC-32 that the part's CRC unit computes (RM0008 4): polynomial 04C11DB7, start FFFFFFFF, not
+/// reflected. By bits, because it is computed at a start and at a save, and else once a minute at most.
+#[inline(never)]
+fn crc(words: &[u32]) -> u32 {
+    words.iter().fold(u32::MAX, |crc, word| {
+        (0..32).fold(crc ^ word, |crc, _| {
+            let out = if crc >> 31 == 0 { 0 } else { 0x04C1_1DB7 };
+            crc << 1 ^ out
+        })
+    })
 }
 
 #[cfg(test)]
@@ -270,9 +291,11 @@ mod tests {
     }
 
     #[test]
-    fn fields_of_a_newer_image_are_kept() {
+    fn fields_of_a_newer_image_are_kept_and_the_crc_is_that_of_the_parts_unit() {
         let states = update(&in_service(), |sealed| sealed.0[COPY - 2] = 1234);
         let states = update(states.last().unwrap(), |sealed| sealed.set(FLAGS, DIP, 18));
         assert_eq!(find(states.last().unwrap()).unwrap().0[COPY - 2], 1234);
+        // CRC-32/MPEG-2 of the characters 12345678.
+        assert_eq!(crc(&[0x3132_3334, 0x3536_3738]), 0x49E3_C2FB);
     }
 }

@@ -54,7 +54,7 @@ pub fn check(elf: &Elf<'_>, symbols: &[Symbol]) -> Result<()> {
     ensure!(
         uses.is_empty(),
         "code in RAM uses flash, which cannot be read during a save: {}; change it, or add what it uses to .ram_code \
-         in firmware/memory/sections.x",
+         in board-support/memory/sections.x",
         uses.join(", ")
     );
     Ok(())

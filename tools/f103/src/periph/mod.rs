@@ -3,6 +3,7 @@
 pub mod adc;
 pub mod afio;
 pub mod clocks;
+pub mod crc;
 pub mod dbgmcu;
 pub mod exti;
 pub mod flash;

@@ -40,10 +40,12 @@ pub enum Block {
     Flash,
     /// Power control.
     Pwr,
+    /// CRC unit.
+    Crc,
 }
 
 /// Number of blocks that are modelled.
-pub const BLOCKS: usize = 18;
+pub const BLOCKS: usize = 19;
 
 /// The owner of an address in the peripheral region.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -99,7 +101,7 @@ const PLACES: [(u32, Place); 34] = {
         (0x4002_0000, Absent("DMA1")),
         (0x4002_1000, Place::Block(B::Rcc)),
         (0x4002_2000, Place::Block(B::Flash)),
-        (0x4002_3000, Absent("CRC")),
+        (0x4002_3000, Place::Block(B::Crc)),
         // The rest of the last grains of AHB blocks is reserved.
         (0x4002_1400, Reserved),
         (0x4002_2400, Reserved),
@@ -160,6 +162,7 @@ impl Block {
         Self::Rcc,
         Self::Flash,
         Self::Pwr,
+        Self::Crc,
     ];
 
     /// Returns the block whose clock and reset are bit `bit` of RCC's registers for APB2 (`bus` 0) or APB1 (`bus` 1).
@@ -170,8 +173,8 @@ impl Block {
             .find(|block| block.clock() == Some((bus, bit)))
     }
 
-    /// Returns the bus, APB2 (0) or APB1 (1), and the bit in RCC's registers that enables the clock of the block and
-    /// resets it (RM0008 7.3.4 to 7.3.8). `None` if the block always has its clock.
+    /// Returns the bus, APB2 (0), APB1 (1) or AHB (2), and the bit in RCC's registers that enables the clock of the block
+    /// and resets it, if the bus is an APB (RM0008 7.3.4 to 7.3.8). `None` if the block always has its clock.
     #[must_use]
     pub const fn clock(self) -> Option<(usize, u32)> {
         Some(match self {
@@ -189,6 +192,7 @@ impl Block {
             Self::Usart3 => (1, 18),
             Self::I2c1 => (1, 21),
             Self::Pwr => (1, 28),
+            Self::Crc => (2, 6),
             Self::Iwdg | Self::Exti | Self::Rcc | Self::Flash => return None,
         })
     }
@@ -214,6 +218,7 @@ impl Block {
             | Self::GpioC
             | Self::GpioD
             | Self::Adc1
+            | Self::Crc
             | Self::Flash => Widths::Word,
         }
     }
@@ -240,6 +245,7 @@ impl Block {
             Self::Rcc => "RCC",
             Self::Flash => "FLASH",
             Self::Pwr => "PWR",
+            Self::Crc => "CRC",
         }
     }
 }
@@ -291,7 +297,7 @@ mod tests {
     fn place_returns_the_block_of_an_address() {
         assert_eq!(place(0x4001_3804), (Place::Block(Block::Usart1), 4));
         assert_eq!(place(0x4000_0C00).0, Place::Reserved);
-        assert_eq!(place(0x4002_3000).0, Place::Absent("CRC"));
+        assert_eq!(place(0x4002_0000).0, Place::Absent("DMA1"));
         assert_eq!(place(0x4003_0000).0, Place::Reserved);
         assert_eq!(place(0x3FFF_FFFF).0, Place::Reserved);
         for (n, block) in Block::ALL.into_iter().enumerate() {

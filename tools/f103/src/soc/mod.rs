@@ -16,6 +16,7 @@ use crate::part::Part;
 use crate::periph::adc::Adc;
 use crate::periph::afio::Afio;
 use crate::periph::clocks::Clocks;
+use crate::periph::crc::Crc;
 use crate::periph::exti::Exti;
 use crate::periph::flash::Flash;
 use crate::periph::gpio::Gpio;
@@ -46,6 +47,7 @@ pub struct Soc<C> {
     pub circuit: C,
     /// Power control, with the supply voltage.
     pub pwr: Pwr,
+    crc: Crc,
     afio: Afio,
     exti: Exti,
     iwdg: Iwdg,
@@ -113,6 +115,7 @@ impl<C: Circuit> Soc<C> {
             gpio: [0, 0, 0xE000, 0].map(Gpio::with_slow_pins),
             circuit,
             pwr: Pwr::default(),
+            crc: Crc::default(),
             afio: Afio::default(),
             exti: Exti::default(),
             iwdg: Iwdg::new(oscillators.lsi),
@@ -274,7 +277,7 @@ impl<C: Circuit> Soc<C> {
         if apb2 | apb1 != 0
             && block
                 .clock()
-                .is_some_and(|(bus, bit)| [apb2, apb1][bus] >> bit & 1 != 0)
+                .is_some_and(|(bus, bit)| [apb2, apb1, 0][bus] >> bit & 1 != 0)
         {
             return Ok(());
         }
@@ -288,10 +291,10 @@ impl<C: Circuit> Soc<C> {
     /// Returns whether `block` has its clock (RM0008 7.3.7, 7.3.8).
     #[must_use]
     pub fn is_clocked(&self, block: Block) -> bool {
-        let (apb2, apb1) = self.rcc.enabled();
+        let enabled = self.rcc.enabled();
         block
             .clock()
-            .is_none_or(|(bus, bit)| [apb2, apb1][bus] >> bit & 1 != 0)
+            .is_none_or(|(bus, bit)| enabled[bus] >> bit & 1 != 0)
     }
 
     /// Handles a store of the core to the flash at `offset`. `half` says whether it is a half-word.
@@ -381,6 +384,7 @@ impl<C: Circuit> Soc<C> {
             Block::Rcc => &mut self.rcc,
             Block::Flash => &mut self.flash,
             Block::Pwr => &mut self.pwr,
+            Block::Crc => &mut self.crc,
         }
     }
 }

@@ -1,6 +1,6 @@
 //! A board that runs the image, and a master on its line.
 
-use std::{env, ops::Range, path::Path, sync::OnceLock};
+use std::{env, ops::Range, path::PathBuf, sync::OnceLock};
 
 use register_map::{configuration, points};
 use sim::{
@@ -38,10 +38,14 @@ const FLASH_START: u32 = 0x0800_0000;
 /// Returns the image under test.
 pub fn image() -> &'static Image {
     static IMAGE: OnceLock<Image> = OnceLock::new();
-    IMAGE.get_or_init(|| {
-        let path = env::var_os(ELF).unwrap_or_else(|| panic!("{ELF}: cargo xtask test sets it"));
-        Image::read(Path::new(&path)).expect("the image can be read")
-    })
+    IMAGE.get_or_init(|| Image::read(&path(ELF)).expect("the image can be read"))
+}
+
+/// Returns the path that a variable names.
+pub fn path(variable: &str) -> PathBuf {
+    let path = env::var_os(variable);
+    path.unwrap_or_else(|| panic!("{variable}: cargo xtask test sets it"))
+        .into()
 }
 
 /// Returns a flash whose stored configuration has only the first slot's module.
@@ -178,11 +182,16 @@ impl Bench {
     }
 
     /// Returns a board that was powered just now, at the corner at which the tests run.
-    pub fn cold(mut config: Config) -> Self {
+    pub fn cold(config: Config) -> Self {
+        Self::of(image(), config)
+    }
+
+    /// The same, with another image.
+    pub fn of(image: &Image, mut config: Config) -> Self {
         config.layout = LAYOUT;
         config.chip.corner = corner();
         Self {
-            board: Board::new(image(), config).expect("the image fits"),
+            board: Board::new(image, config).expect("the image fits"),
             settings: Settings::default(),
             sent: Time::ZERO,
             // Two characters at 921600 bit/s are less than the unit needs at the slow corner.

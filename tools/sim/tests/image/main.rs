@@ -16,6 +16,7 @@
 //! | configuration | `lock`, `in_force`, `module_choice`, `storing`, `saving`, `save_budget`, `flash_faults`, `power_cut` |
 //! | the simulator | `cores`: boards of one process share translated code |
 //! | the radio | `radio`, `air` |
+//! | the loader | `loading` |
 //! | safety | `boot`, `clock`, `outputs_at_start`, `comm_watchdog`, `hung_task`, `faults`, `upsets`, `kept`, `stack`, `log`, `long_run` |
 
 use sim::board::{Layout, MODIO_02};
@@ -43,6 +44,7 @@ mod hung_task;
 mod identify;
 mod in_force;
 mod kept;
+mod loading;
 mod lock;
 mod log;
 mod long_run;

@@ -185,10 +185,10 @@ impl Rcc {
         self.hsi.is_some()
     }
 
-    /// Returns the clock enables of APB2 and APB1.
+    /// Returns the clock enables of APB2, APB1 and AHB.
     #[must_use]
-    pub fn enabled(&self) -> (u32, u32) {
-        self.enr
+    pub fn enabled(&self) -> [u32; 3] {
+        [self.enr.0, self.enr.1, self.ahbenr]
     }
 
     /// Returns the resets that RSTR holds, of APB2 and APB1.

@@ -1,6 +1,8 @@
 //! The decisions of the loader, in the order in which it makes them at every start.
 
-use super::{Reason, Record, Slot, State, TRIALS};
+use register_map::update::{Reason, Slot, State, TRIALS};
+
+use crate::Record;
 
 /// What the loader needs of the part.
 pub trait Part {
@@ -62,8 +64,8 @@ pub enum Next {
 /// Nothing is started but an intact image that was found genuine once: *trial* and *confirmed* are reached only through
 /// [`Part::check`].
 pub fn decide(part: &mut impl Part, record: Option<Record>, start: Start) -> Next {
-    let Some(mut record) = record.or_else(|| first(part)) else {
-        return Next::Nothing;
+    let Some(mut record) = record else {
+        return first(part);
     };
     match checked(part, &mut record) {
         Ok(false) => {}
@@ -82,19 +84,22 @@ pub fn decide(part: &mut impl Part, record: Option<Record>, start: Start) -> Nex
     }
 }
 
-/// Step 1, without a boot state: the first genuine image is confirmed. When the record cannot be written, the same
-/// image is found again at the next start.
-fn first(part: &mut impl Part) -> Option<Record> {
+/// Step 1, without a boot state: the first genuine image is confirmed. When the record cannot be written, the image is
+/// started all the same, and found again at the next start.
+fn first(part: &mut impl Part) -> Next {
     let genuine = |slot: &Slot| part.is_intact(*slot) && part.check(*slot, 0).is_ok();
-    let slot = Slot::ALL.into_iter().find(genuine)?;
+    let Some(slot) = Slot::ALL.into_iter().find(genuine) else {
+        return Next::Nothing;
+    };
     let record = Record {
         preferred: slot,
         states: [State::Empty; 2],
         floor: part.epoch(slot),
     };
-    let record = record.with(slot, State::Confirmed);
-    let _ = part.write(record);
-    Some(record)
+    match part.write(record.with(slot, State::Confirmed)) {
+        Ok(()) => Next::Reset,
+        Err(Unwritten) => Next::Run { slot, chosen: None },
+    }
 }
 
 /// Steps 2 and 3: ends a check that was interrupted, and checks a new image. Returns whether an image was checked.

@@ -1,15 +1,17 @@
 //! Walks through every state of a unit that the loader's decisions and the application's orders can reach: every event in
 //! each, and a power cut between any two writes.
 //!
-//! A slot holds one of a few contents, and a record is written whole, because [`journal`](super::journal) seals it.
+//! A slot holds one of a few contents, and a record is written whole, because [`journal`](crate::journal) seals it.
 
 extern crate std;
 use std::{collections::HashSet, vec, vec::Vec};
 
-use super::{
-    Reason, Record, Slot, State, TRIALS,
+use register_map::update::{Reason, Slot, State, TRIALS};
+
+use crate::{
+    Record,
     commands::Running,
-    loader::{Next, Part, Start, Unwritten, decide},
+    decide::{Next, Part, Start, Unwritten, decide},
 };
 
 /// What a slot holds.

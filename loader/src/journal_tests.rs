@@ -4,7 +4,7 @@ extern crate std;
 use std::{vec, vec::Vec};
 
 use super::*;
-use crate::boot::Reason;
+use register_map::update::Reason;
 
 const PAGE: usize = 1024;
 

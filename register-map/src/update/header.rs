@@ -13,16 +13,18 @@
 //! | 156 | 4 | first bytes of the SHA-512 of the public key |
 //! | 160 | 352 | zero |
 
+use crc::{CRC_32_MPEG_2, Crc, NoTable};
+
 use super::Reason;
 
 /// Bytes of the header.
-pub const BYTES: usize = 512;
+const BYTES: usize = crate::layout::HEADER as usize;
 /// Bytes of the header that the CRC-32 covers, together with the application.
-pub const IN_CRC: usize = 20;
+const IN_CRC: usize = 20;
 /// Bytes of the header that are signed.
-pub const SIGNED: usize = 92;
+const SIGNED: usize = 92;
 /// Least bytes of an application.
-pub const LEAST: usize = 512;
+const LEAST: usize = 512;
 
 const MAGIC: [u8; 4] = *b"MODI";
 const VERSION: u8 = 2;
@@ -139,7 +141,7 @@ impl<'a> Header<'a> {
     ///
     /// # Errors
     ///
-    /// [`Reason::Length`] unless its bytes are a multiple of 4, [`LEAST`] or more, and fit the slot.
+    /// [`Reason::Length`] unless its bytes are a multiple of 4, 512 or more, and fit the slot.
     pub fn application<'b>(&self, slot: &'b [u8]) -> Result<&'b [u8], Reason> {
         let length = self.length() as usize;
         let application = slot.get(BYTES..).and_then(|rest| rest.get(..length));
@@ -147,6 +149,20 @@ impl<'a> Header<'a> {
             .filter(|_| length >= LEAST && length.is_multiple_of(4))
             .ok_or(Reason::Length)
     }
+}
+
+/// Returns the CRC-32 that the part's unit computes over parts whose bytes are multiples of 4, in little-endian words
+/// (RM0008 4).
+#[must_use]
+pub fn crc32(parts: [&[u8]; 2]) -> u32 {
+    const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_MPEG_2);
+    let mut digest = CRC.digest();
+    for word in parts.into_iter().flat_map(|part| part.as_chunks::<4>().0) {
+        // The unit takes the highest bit of a word first.
+        let [a, b, c, d] = *word;
+        digest.update(&[d, c, b, a]);
+    }
+    digest.finalize()
 }
 
 /// Returns the header of an image whose magic number, bounds, zero bytes and CRC-32 are right. `crc` computes the
@@ -174,19 +190,6 @@ mod tests {
     use std::vec::Vec;
 
     use super::*;
-    use crate::crc32::crc32;
-
-    fn crc(parts: [&[u8]; 2]) -> u32 {
-        let words: Vec<u32> = parts
-            .concat()
-            .as_chunks()
-            .0
-            .iter()
-            .map(|word| u32::from_le_bytes(*word))
-            .collect();
-        crc32(&words)
-    }
-
     /// A slot of 2 KiB with an application of 1 KiB.
     fn slot() -> Vec<u8> {
         let mut slot = std::vec![0xFF; 2048];
@@ -198,7 +201,7 @@ mod tests {
         slot[16..20].copy_from_slice(&1024u32.to_le_bytes());
         slot[24..28].copy_from_slice(&[0x34, 0x12, 0xCD, 0xAB]);
         (0..1024).for_each(|n| slot[BYTES + n] = (n * n) as u8);
-        let right = crc([&slot[..IN_CRC], &slot[BYTES..BYTES + 1024]]);
+        let right = crc32([&slot[..IN_CRC], &slot[BYTES..BYTES + 1024]]);
         slot[20..24].copy_from_slice(&right.to_le_bytes());
         slot
     }
@@ -206,7 +209,7 @@ mod tests {
     #[test]
     fn fields_are_at_the_offsets_of_the_contract() {
         let slot = slot();
-        let header = intact(&slot, crc).unwrap();
+        let header = intact(&slot, crc32).unwrap();
         assert_eq!((header.board(), header.epoch()), (1, 7));
         assert_eq!(header.version(), ([0, 3], 4));
         assert_eq!((header.address(), header.length()), (0x0800_4000, 1024));
@@ -223,8 +226,17 @@ mod tests {
         for (byte, bit) in covered.flat_map(|byte| (0..8).map(move |bit| (byte, bit))) {
             let mut wrong = right.clone();
             wrong[byte] ^= 1 << bit;
-            assert!(intact(&wrong, crc).is_err(), "byte {byte} bit {bit}");
+            assert!(intact(&wrong, crc32).is_err(), "byte {byte} bit {bit}");
         }
+    }
+
+    #[test]
+    fn crc_is_that_of_the_parts_unit() {
+        assert_eq!(
+            crc32([b"4321", b"8765"]),
+            0x49E3_C2FB,
+            "CRC-32/MPEG-2 of 12345678"
+        );
     }
 
     #[test]
@@ -245,6 +257,6 @@ mod tests {
             let refused = intact(&slot, |_| unreachable!()).unwrap_err();
             assert_eq!(refused, Reason::Length, "{length}");
         }
-        assert_eq!(intact(&slot()[..511], crc).unwrap_err(), Reason::Magic);
+        assert_eq!(intact(&slot()[..511], crc32).unwrap_err(), Reason::Magic);
     }
 }

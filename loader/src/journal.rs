@@ -6,7 +6,7 @@
 //!            3       details of the states of A (low byte) and B
 //!            4       epoch floor
 //!            5       the layout, and no erased half-word
-//!            6-7     CRC-32 of the words before
+//!            6-7     CRC-32 of the half-words before, as in the header of an image
 //!            8, 9    seals: 0 when programmed
 //! ```
 //!
@@ -16,11 +16,10 @@
 //! whose programming was cut may read differently from start to start; [`Journal::seal_again`] ends that before
 //! anything is decided.
 
-use super::{Record, Slot, State};
-use crate::{
-    crc32::crc32,
-    pages::{Page, Pages},
-};
+use board_support::pages::{Page, Pages};
+use register_map::update::{Slot, State, crc32};
+
+use crate::Record;
 
 /// Half-words of a record.
 const HALVES: usize = 10;
@@ -114,6 +113,12 @@ impl Journal {
     #[must_use]
     pub fn record(&self) -> Option<Record> {
         self.newest.map(|found| found.record)
+    }
+
+    /// Returns whether a cut left only one seal of the newest record.
+    #[must_use]
+    pub fn is_half_sealed(&self) -> bool {
+        self.newest.is_some_and(|found| !found.sealed_twice)
     }
 
     /// Programs the seals of the newest record again if a cut left only one. Call this at the start, before the state
@@ -216,10 +221,10 @@ fn encoded(number: u32, record: Record) -> [u16; UNSEALED] {
     halves
 }
 
-/// Returns the CRC-32 of the words in front of it.
+/// Returns the CRC-32 of the half-words in front of it.
 fn crc_of(halves: &[u16; UNSEALED]) -> u32 {
-    let [a, b, c, d, e, f, ..] = halves.map(u32::from);
-    crc32(&[a | b << 16, c | d << 16, e | f << 16])
+    let bytes = halves.map(u16::to_le_bytes);
+    crc32([bytes.as_flattened().split_at(2 * UNSEALED - 4).0, &[]])
 }
 
 /// Returns the number and the boot state of a record whose CRC is right.

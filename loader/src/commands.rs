@@ -1,7 +1,9 @@
 //! The orders that change the boot state while the application runs. Each returns the record to write; the order takes
 //! effect once that record is in flash.
 
-use super::{Reason, Record, Slot, State};
+use register_map::update::{Reason, Slot, State};
+
+use crate::Record;
 
 /// The state does not allow the order: exception 06.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,8 +91,9 @@ mod tests {
     extern crate std;
     use std::vec::Vec;
 
+    use register_map::update::TRIALS;
+
     use super::*;
-    use crate::boot::TRIALS;
 
     fn states() -> Vec<State> {
         let codes = (0..=u8::MAX).flat_map(|code| (0..=u8::MAX).map(move |detail| (code, detail)));

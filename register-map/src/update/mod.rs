@@ -1,25 +1,8 @@
-//! The boot state: which image each slot holds, and which one is started.
-//!
-//! A unit runs from one of two slots, and an update is written into the other one. [`Record`] is the whole state;
-//! [`journal`] keeps it in two pages of flash. [`loader`] has the decisions of the loader and [`commands`] those of the
-//! application. Both are this one module, and its tests walk through every state, every event, and a power cut
-//! between any two writes.
-//!
-//! ```text
-//!           0xB001              0xB002            loader             loader, at a start       0xB003
-//!   any ─────────────> receiving ──────> new ─────────────> checking ────────────────> trial ──────> confirmed
-//!                          ▲                                   │                         │
-//!                          │ 0xB001                            ▼                         ▼
-//!                          └─────────────────────────────── rejected (why) <─────────────┘
-//! ```
+//! What an update over the line brings and reports: slots, their states, and the header of an image.
 
-pub mod commands;
-pub mod header;
-pub mod journal;
-pub mod loader;
+mod header;
 
-#[cfg(test)]
-mod walk;
+pub use header::{Header, crc32, intact};
 
 /// One of the two places for an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -84,7 +67,7 @@ impl Reason {
     ];
 }
 
-/// Number of starts that an image has in which to be confirmed. A start that was asked for does not count.
+/// Number of starts that an image on trial has. A start that was asked for does not count.
 pub const TRIALS: u8 = 2;
 
 /// What a slot holds.
@@ -143,40 +126,6 @@ impl State {
     #[must_use]
     pub const fn may_start(self) -> bool {
         matches!(self, Self::Trial(_) | Self::Confirmed)
-    }
-}
-
-/// The whole boot state.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Record {
-    /// The slot that is started when nothing else is asked for.
-    pub preferred: Slot,
-    /// The states of slots A and B.
-    pub states: [State; 2],
-    /// The lowest security epoch of an image that becomes new.
-    pub floor: u16,
-}
-
-impl Record {
-    /// Returns the state of a slot.
-    #[must_use]
-    pub const fn state(&self, slot: Slot) -> State {
-        let [a, b] = self.states;
-        match slot {
-            Slot::A => a,
-            Slot::B => b,
-        }
-    }
-
-    /// Returns the record with another state of a slot.
-    #[must_use]
-    pub const fn with(mut self, slot: Slot, state: State) -> Self {
-        let [a, b] = &mut self.states;
-        *match slot {
-            Slot::A => a,
-            Slot::B => b,
-        } = state;
-        self
     }
 }
 

@@ -1,0 +1,55 @@
+//! What the loader reads and keeps in the region.
+
+use super::{
+    region::{read, update},
+    sealed::{ASKED, CAUSE, FLAGS, Sealed, UNSEEN},
+};
+
+/// The slot that SW01 = 254 chose at power-on: 0 none, 1 A, 2 B.
+const CHOSEN: u32 = 0b11 << 11;
+/// SW01 was read as 254 at power-on, and no application has been started since.
+const SWITCHED: u32 = 1 << 13;
+
+/// What the loader needs of the region.
+pub(crate) struct AtLoading {
+    /// COMMAND 2 asked for this restart.
+    pub asked: bool,
+    /// The slot that SW01 = 254 chose at power-on: 0 none, 1 A, 2 B.
+    pub chosen: u8,
+    /// SW01 was read as 254 at power-on, and no application has been started since.
+    pub switched: bool,
+    /// SW01 has been read since power-on.
+    pub has_dip: bool,
+}
+
+/// Returns the content for the loader, which calls this once at every start, and keeps the reset flags for the
+/// application. Those of an earlier start of the loader that no application has seen are kept, too.
+pub(crate) fn at_loading(cause: u8) -> AtLoading {
+    let mut sealed = Sealed::after_power_on();
+    sealed.load(read);
+    let flags = sealed.word(FLAGS);
+    update(None, FLAGS, ASKED, 0);
+    let unseen = if sealed.word(CAUSE) & UNSEEN != 0 {
+        0
+    } else {
+        u32::MAX
+    };
+    update(None, CAUSE, unseen, UNSEEN | u32::from(cause));
+    AtLoading {
+        asked: flags & ASKED != 0,
+        chosen: ((flags & CHOSEN) >> CHOSEN.trailing_zeros()) as u8,
+        switched: flags & SWITCHED != 0,
+        has_dip: sealed.dip().is_some(),
+    }
+}
+
+/// Keeps that SW01 was read as 254.
+pub(crate) fn keep_switched() {
+    update(None, FLAGS, 0, SWITCHED);
+}
+
+/// Keeps the slot that SW01 = 254 chose: 0 none, 1 A, 2 B. SW01 has no effect any more.
+pub(crate) fn keep_chosen(slot: u8) {
+    let number = u32::from(slot) << CHOSEN.trailing_zeros();
+    update(None, FLAGS, CHOSEN | SWITCHED, number);
+}

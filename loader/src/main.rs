@@ -1,0 +1,119 @@
+//! The loader of a modio: chooses which of two images is started, and checks that a new one is genuine. It has no UART,
+//! no command and no protocol.
+//!
+//! [`decide`] has the decisions, [`genuine`] what an image must be. The loader runs on the internal oscillator and leaves
+//! everything as after a reset but the watchdog, which cannot be stopped.
+
+#![no_std]
+#![no_main]
+
+mod genuine;
+
+use core::{arch::naked_asm, panic::PanicInfo};
+
+use board_support::{
+    loading::{Loading, slot_bytes},
+    pac, restart,
+};
+use cortex_m_rt::{entry, exception};
+use loader::{
+    Record,
+    decide::{Next, Part, Start, Unwritten, decide},
+    journal::Journal,
+};
+use register_map::{
+    layout::HEADER,
+    update::{Header, Reason, Slot, intact},
+};
+
+/// The part, and the boot state in its flash.
+struct Unit {
+    loading: Loading,
+    journal: Journal,
+}
+
+impl Unit {
+    /// Returns the header of an intact image.
+    fn intact(&mut self, slot: Slot) -> Option<Header<'static>> {
+        let bytes = slot_bytes(slot as usize);
+        intact(bytes, |parts| self.loading.crc32(parts)).ok()
+    }
+}
+
+impl Part for Unit {
+    fn is_intact(&mut self, slot: Slot) -> bool {
+        self.intact(slot).is_some()
+    }
+
+    fn epoch(&mut self, slot: Slot) -> u16 {
+        let header = Header::of(slot_bytes(slot as usize));
+        header.map_or(0, |header| header.epoch())
+    }
+
+    fn check(&mut self, slot: Slot, floor: u16) -> Result<(), Reason> {
+        self.loading.run_fast();
+        genuine::check(slot, floor)
+    }
+
+    fn write(&mut self, record: Record) -> Result<(), Unwritten> {
+        self.loading.wait_for_supply();
+        let pages = &mut self.loading.boot_pages();
+        self.journal.write(pages, record).map_err(|_| Unwritten)
+    }
+}
+
+#[entry]
+fn main() -> ! {
+    let (Some(device), Some(core)) = (pac::Peripherals::take(), cortex_m::Peripherals::take())
+    else {
+        restart();
+    };
+    let (mut loading, found) = Loading::start(device);
+    let mut journal = Journal::open(&loading.boot_pages());
+    if journal.is_half_sealed() {
+        loading.wait_for_supply();
+        // When this fails, the state is used as it was read.
+        let _ = journal.seal_again(&mut loading.boot_pages());
+    }
+    let record = journal.record();
+    let start = Start {
+        asked: found.asked,
+        switched: found.switched,
+        chosen: found.chosen.and_then(|slot| Slot::ALL.get(slot).copied()),
+    };
+    let mut unit = Unit { loading, journal };
+    match decide(&mut unit, record, start) {
+        // SAFETY: only an intact image is started, and it was found genuine, which includes its address.
+        Next::Run { slot, chosen } => unsafe {
+            let loading = unit.loading;
+            loading.run(slot as usize, HEADER, chosen.is_some(), &core.SCB)
+        },
+        Next::Reset => restart(),
+        Next::Nothing => unit.loading.show_nothing(),
+    }
+}
+
+/// A failure of the crystal. The next start ends the check that was interrupted.
+#[exception]
+unsafe fn DefaultHandler(_: i16) {
+    restart();
+}
+
+/// Resets the part without the stack, which may be the cause of the fault (PM0056 4.4.5: AIRCR).
+// SAFETY: cortex-m-rt's vector table has this name for the exception. The function never returns.
+#[unsafe(no_mangle)]
+#[unsafe(naked)]
+unsafe extern "C" fn HardFault() -> ! {
+    naked_asm!(
+        "ldr r0, =0xE000ED0C",
+        "ldr r1, =0x05FA0004",
+        "str r1, [r0]",
+        "1: b 1b",
+    )
+}
+
+/// Never called: `cargo xtask build` checks that the loader contains no panic.
+#[panic_handler]
+fn panic(_: &PanicInfo<'_>) -> ! {
+    restart();
+}

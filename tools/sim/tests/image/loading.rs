@@ -1,0 +1,221 @@
+//! The loader, with signed images in its slots: which one it starts at the first power-on, and what it refuses.
+
+use std::{fs, sync::LazyLock};
+
+use register_map::state::RESET_CAUSE;
+use register_map::state::reset_cause::{PIN, POWER_ON, SOFTWARE};
+use register_map::update::crc32;
+use sim::{Config, Image, Time, chip};
+
+use crate::{
+    LAYOUT,
+    bench::{Bench, PAGE_SIZE, PORT, flash_with_settings, pages, path},
+};
+
+/// Offset of the application in an image, and of fields in the header.
+const APPLICATION: usize = 512;
+const BOARD: usize = 5;
+const ADDRESS: usize = 12;
+const LENGTH: usize = 16;
+const CRC: usize = 20;
+const HASH: usize = 28;
+const SIGNATURE: usize = 92;
+const KEY: usize = 156;
+const RAM: u32 = 0x2000_0000;
+
+/// Time from power-on to the first answer, when the loader checks no signature.
+const START: Time = Time::from_ms(400);
+/// The longest check of an image, at the slow corner.
+const CHECK: Time = Time::from_ms(4_000);
+
+/// The loader, and the images for slots A and B.
+static BUILT: LazyLock<(Image, [Vec<u8>; 2])> = LazyLock::new(|| {
+    let image = |name| fs::read(path(name)).expect("the image can be read");
+    (
+        Image::read(&path("MODIO_LOADER")).expect("the loader can be read"),
+        [image("MODIO_A"), image("MODIO_B")],
+    )
+});
+
+/// Returns the image for a slot, 0 or 1.
+fn image(slot: usize) -> Vec<u8> {
+    BUILT.1[slot].clone()
+}
+
+/// Returns a board just powered on, with these images in its slots and one module in its configuration.
+fn unit(slots: [&[u8]; 2]) -> Bench {
+    let layout = LAYOUT.board.layout();
+    let offset = |address: u32| (address - 0x0800_0000) as usize;
+    let mut flash = flash_with_settings(&[(0x010F + PORT, 1)]);
+    let [stored, _] = pages();
+    let page = flash[stored.clone()].to_vec();
+    flash[stored].fill(0xFF);
+    let store = offset(layout.store.first);
+    flash[store..store + PAGE_SIZE].copy_from_slice(&page);
+    for (address, image) in layout.slots.into_iter().zip(slots) {
+        let at = offset(address);
+        flash[at..at + image.len()].copy_from_slice(image);
+    }
+    let config = Config {
+        chip: chip::Config::holding(flash),
+        ..Config::default()
+    };
+    let mut bench = Bench::of(&BUILT.0, config);
+    // The loader's reset after a check.
+    bench.tolerant = true;
+    bench
+}
+
+/// Runs until the unit answers, and returns that time.
+fn answers(bench: &mut Bench, within: Time) -> Option<Time> {
+    let end = bench.board.now() + within;
+    while bench.board.now() < end {
+        bench.board.run_for(Time::from_ms(20));
+        if bench.ask(1, &[3, 2, 5, 0, 1]).is_some() {
+            assert_eq!(bench.register(0x0205), LAYOUT.board.code);
+            assert_eq!(bench.register(0x020F + PORT), 1, "the stored module");
+            assert_eq!(bench.board.findings(), []);
+            return Some(bench.board.now());
+        }
+    }
+    None
+}
+
+/// Returns the slot whose code runs.
+fn runs_from(bench: &Bench) -> usize {
+    let [a, b] = LAYOUT.board.layout().slots;
+    let pc = bench.board.pc();
+    assert!(pc >= a, "the loader runs");
+    usize::from(pc >= b)
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn the_first_genuine_image_starts_and_the_next_start_checks_no_signature() {
+    let (a, b) = (image(0), image(1));
+    for (slots, starts) in [
+        ([&a[..], &[]], 0),
+        ([&[], &b[..]], 1),
+        ([&a[..], &b[..]], 0),
+    ] {
+        let mut bench = unit(slots);
+        answers(&mut bench, CHECK + START).expect("it starts");
+        assert_eq!(runs_from(&bench), starts);
+        assert_eq!(bench.board.resets(), 1, "the loader's, after the check");
+        assert_eq!(bench.register(RESET_CAUSE), POWER_ON | PIN | SOFTWARE);
+        bench.board.cycle();
+        let operations = bench.board.flash_operations();
+        answers(&mut bench, START).expect("it starts again");
+        assert_eq!((bench.board.resets(), runs_from(&bench)), (0, starts));
+        assert_eq!(bench.board.flash_operations(), operations);
+        assert_eq!(bench.register(RESET_CAUSE), POWER_ON | PIN);
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn the_application_starts_within_100_ms_of_the_reset() {
+    let (a, b) = (image(0), image(1));
+    let mut bench = unit([&a, &b]);
+    answers(&mut bench, CHECK + START).expect("it starts");
+    let [slot, _] = LAYOUT.board.layout().slots;
+    bench.board.cycle();
+    let from = bench.board.now();
+    while !(slot..RAM).contains(&bench.board.pc()) {
+        bench.board.run_for(Time::from_us(100));
+    }
+    let took = bench.board.now() - from;
+    println!("the loader takes {took:?}");
+    assert!(took < Time::from_ms(100), "{took:?}");
+}
+
+/// Returns the image for slot A with these bytes, and the CRC-32 that belongs to them.
+fn changed(at: usize, bytes: &[u8]) -> Vec<u8> {
+    let mut image = image(0);
+    image[at..at + bytes.len()].copy_from_slice(bytes);
+    let crc = crc32([&image[..CRC], &image[APPLICATION..]]);
+    image[CRC..CRC + 4].copy_from_slice(&crc.to_le_bytes());
+    image
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn an_image_with_anything_wrong_is_not_started() {
+    let a = image(0);
+    let last = a.len() - 1;
+    let length = |length: u32| changed(LENGTH, &length.to_le_bytes());
+    let whole = (a.len() - APPLICATION) as u32;
+    let mut crc = a.clone();
+    crc[CRC] ^= 1;
+    for (what, wrong) in [
+        ("magic", changed(0, b"MODJ")),
+        ("version of the header", changed(4, &[3])),
+        ("board", changed(BOARD, &[2])),
+        ("epoch", changed(6, &[1])),
+        ("address", changed(ADDRESS, &image(1)[ADDRESS..ADDRESS + 4])),
+        ("length 0", length(0)),
+        ("longest length", length(0xFFFF_FFFC)),
+        ("longer", length(whole + 4)),
+        ("shorter", length(whole - 4)),
+        ("odd length", length(whole - 1)),
+        ("CRC", crc),
+        ("commit", changed(24, &[a[24] ^ 1])),
+        ("hash", changed(HASH, &[a[HASH] ^ 1])),
+        ("signature", changed(SIGNATURE, &[a[SIGNATURE] ^ 1])),
+        ("key", changed(KEY, &[a[KEY] ^ 1])),
+        ("zero area", changed(511, &[1])),
+        ("code", changed(last, &[a[last] ^ 0x80])),
+        ("cut short", a[..last].to_vec()),
+        ("image for slot B", image(1)),
+    ] {
+        let mut bench = unit([&wrong, &[]]);
+        while !bench.board.leds().fault {
+            bench.board.run_for(Time::from_ms(20));
+            assert!(bench.board.now() < CHECK, "{what}");
+        }
+        assert!(bench.board.pc() < LAYOUT.board.layout().slots[0], "{what}");
+        assert_eq!(bench.board.resets(), 0, "{what}");
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn without_an_image_the_leds_say_so_and_nothing_is_driven() {
+    let mut bench = unit([&[], &[]]);
+    bench.board.run_for(START);
+    let mut blinks = 0;
+    let mut lit = bench.board.leds().run;
+    for _ in 0..1000 {
+        bench.board.run_for(Time::from_ms(10));
+        let leds = bench.board.leds();
+        assert!(leds.fault && !leds.activity, "{leds:?}");
+        blinks += u32::from(leds.run != lit);
+        lit = leds.run;
+        assert!(!bench.board.driver_enable());
+    }
+    // On or off ten times a second for 10 s, by the internal oscillator.
+    assert!((90..110).contains(&blinks), "{blinks}");
+    assert_eq!(bench.board.resets(), 0);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn power_cut_in_a_flash_operation_of_the_first_start_does_no_harm() {
+    let (a, b) = (image(0), image(1));
+    // The erase of a page, half-words of the record, the first of its CRC-32, and both seals. The tests of the loader's
+    // journal cut every operation.
+    for (n, operation) in [1, 2, 5, 8, 10, 11].into_iter().enumerate() {
+        let mut bench = unit([&a, &b]);
+        let fraction = [0.0, 0.5, 0.75, 1.0][n % 4];
+        bench.board.cut_in_flash_operation(operation, fraction);
+        bench.board.run_for(CHECK);
+        assert!(!bench.board.powered(), "{operation}");
+        bench.board.run_for(Time::from_ms(100));
+        bench.board.power_on();
+        let what = format!("operation {operation}, {fraction} of it");
+        answers(&mut bench, CHECK + START).expect(&what);
+        bench.board.cycle();
+        answers(&mut bench, START).expect(&what);
+        assert_eq!(runs_from(&bench), 0);
+    }
+}
