@@ -141,10 +141,6 @@ impl Cli {
     }
 
     /// Returns the transmission mode, by the option or the profile.
-    ///
-    /// # Errors
-    ///
-    /// When the profile is wrong.
     pub fn mode(&self, profile: Option<&Profile>) -> Result<Mode> {
         if self.ascii {
             return Ok(Mode::Ascii);
@@ -163,10 +159,6 @@ impl Cli {
     }
 
     /// Returns the profile, if one is given.
-    ///
-    /// # Errors
-    ///
-    /// When the profile cannot be read or is wrong.
     pub fn read_profile(&self) -> Result<Option<Profile>> {
         let Some(path) = &self.profile else {
             return Ok(None);
@@ -180,10 +172,6 @@ impl Cli {
     }
 
     /// Opens the endpoint.
-    ///
-    /// # Errors
-    ///
-    /// When no endpoint is named, or when it cannot be opened.
     pub fn open(&self, mode: Mode) -> Result<Box<dyn Endpoint>> {
         ensure!(
             self.format.data_bits != 7 || mode == Mode::Ascii,
@@ -229,10 +217,6 @@ impl Cli {
     }
 
     /// Returns the cases to run.
-    ///
-    /// # Errors
-    ///
-    /// When no case is left.
     pub fn cases(&self) -> Result<Vec<Case>> {
         let mut cases = chosen(&self.only)?;
         cases.retain(|case| {
@@ -248,10 +232,6 @@ impl Cli {
 }
 
 /// Returns the cases whose names contain one of these parts; all when there is none.
-///
-/// # Errors
-///
-/// When no case is left.
 pub fn chosen(parts: &[String]) -> Result<Vec<Case>> {
     let mut cases = crate::cases::all();
     if !parts.is_empty() {

@@ -30,11 +30,7 @@ impl Mode {
         self.framing().frame(0, unit, pdu)
     }
 
-    /// Returns the unit address and the PDU of a frame.
-    ///
-    /// # Errors
-    ///
-    /// What is wrong with the frame, for people.
+    /// Returns the unit address and the PDU of a frame. The error says what is wrong with the frame.
     pub fn decode(self, frame: &[u8]) -> Result<(u8, Vec<u8>), String> {
         // V1.02, 2.5.2 names the digits "0-9, A-F".
         if self == Self::Ascii && frame.iter().any(u8::is_ascii_lowercase) {

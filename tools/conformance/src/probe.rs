@@ -38,11 +38,8 @@ pub const FUNCTIONS: [u8; 18] = [
     1, 2, 3, 4, 5, 6, 7, 8, 0x0B, 0x0C, 0x0F, 0x10, 0x11, 0x14, 0x15, 0x16, 0x17, 0x2B,
 ];
 
-/// Asks the unit. Returns what the unit has, and the waiting times with the unit's own delay.
-///
-/// # Errors
-///
-/// Why the unit cannot be tested, and what to do.
+/// Asks the unit. Returns what the unit has, and the waiting times with the unit's own delay. The error says why the
+/// unit cannot be tested, and what to do.
 pub fn probe(endpoint: &mut dyn Endpoint, given: &Given<'_>) -> Result<(Target, Patience)> {
     let mut target = Target {
         unit: given.unit,

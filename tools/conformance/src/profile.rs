@@ -76,20 +76,12 @@ pub struct Known {
 }
 
 impl Profile {
-    /// Reads a profile.
-    ///
-    /// # Errors
-    ///
-    /// When the text is not a profile, in one line.
+    /// Reads a profile. The error is one line.
     pub fn parse(text: &str) -> Result<Self> {
         toml::from_str(text).map_err(|error| anyhow!(error.to_string().trim().replace('\n', " ")))
     }
 
     /// Returns the mode, if the profile names it.
-    ///
-    /// # Errors
-    ///
-    /// When the mode is neither `rtu` nor `ascii`.
     pub fn mode(&self) -> Result<Option<Mode>> {
         Ok(match self.mode.as_deref() {
             None => None,
@@ -99,11 +91,7 @@ impl Profile {
         })
     }
 
-    /// Returns the unit's points.
-    ///
-    /// # Errors
-    ///
-    /// When the profile contradicts itself, in one line.
+    /// Returns the unit's points. The error is one line.
     pub fn known(&self) -> Result<Known> {
         self.mode()?;
         ensure!(

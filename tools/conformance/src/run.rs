@@ -47,10 +47,6 @@ pub struct Options {
 }
 
 /// Runs these cases. Calls `report` with the outcome of each case.
-///
-/// # Errors
-///
-/// When the endpoint no longer works.
 pub fn run(
     endpoint: &mut dyn Endpoint,
     target: &Target,
@@ -71,12 +67,9 @@ pub fn run(
     Ok(outcomes)
 }
 
-/// Runs these cases until `go_on` returns false. `go_on` is called before each case, so a case that has begun also
-/// ends and restores the unit. Adds each outcome to `outcomes`, and calls `report` with it.
-///
-/// # Errors
-///
-/// When the endpoint no longer works. `outcomes` has the outcomes up to then.
+/// Runs these cases until `go_on` returns false. `go_on` is called before each case, so a case that has begun also ends
+/// and restores the unit. Adds each outcome to `outcomes`, and calls `report` with it. When the endpoint no longer
+/// works, `outcomes` has the outcomes up to then.
 pub fn run_while(
     endpoint: &mut dyn Endpoint,
     target: &Target,

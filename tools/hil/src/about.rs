@@ -140,10 +140,6 @@ impl fmt::Display for Adapter {
 
 impl Unit {
     /// Reads the registers of the unit, a modio with these modules.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Fail`](conformance::case::Stop::Fail) when the registers cannot be read, `Stop::Broken`.
     pub fn ask(bench: &mut Bench<'_>, modules: Modio) -> Check<Self> {
         let mut read = |first, count: u16| {
             bench.read_words(Span {

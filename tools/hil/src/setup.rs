@@ -24,10 +24,6 @@ pub struct Setup {
 
 impl Cli {
     /// Reads the bench file, if one is named.
-    ///
-    /// # Errors
-    ///
-    /// When the file is wrong, or does not fit the command line.
     pub fn setup(&self) -> Result<Setup> {
         let file = match &self.bench {
             None => BenchFile::default(),
@@ -75,10 +71,6 @@ impl Setup {
     }
 
     /// Opens the line.
-    ///
-    /// # Errors
-    ///
-    /// When the line cannot be opened.
     pub fn open(&self) -> Result<Box<dyn Endpoint>, Broken> {
         let line: Box<dyn Endpoint> = match (self.port(), &self.cli.tcp) {
             (Some(port), _) => Box::new(Stream::serial(port, self.line())?),
@@ -110,10 +102,6 @@ impl Setup {
     }
 
     /// Returns the tests to run on this line.
-    ///
-    /// # Errors
-    ///
-    /// When no case has a name that was asked for.
     pub fn plan(&self, endpoint: &dyn Endpoint) -> Result<Plan> {
         let (cli, file) = (&self.cli, &self.file);
         Ok(Plan {

@@ -60,10 +60,6 @@ fn echo(number: u16) -> Vec<u8> {
 }
 
 /// Sends this number of requests, each as soon as the line allows. Ends early when `stop` is set.
-///
-/// # Errors
-///
-/// [`Stop::Broken`](conformance::case::Stop::Broken).
 pub fn measure(bench: &mut Bench<'_>, requests: u32, stop: &AtomicBool) -> Check<Tally> {
     let line = bench.endpoint.line();
     let exact = bench.endpoint.abilities().exact;

@@ -8,10 +8,6 @@ use crate::names::{Book, Item, Meaning};
 use crate::value::{table_name, takes, unit_name};
 
 /// Returns the description of a unit for programs. `source` is the source of the description.
-///
-/// # Errors
-///
-/// When the unit is not a modio.
 pub fn as_json(book: &Book, source: &str) -> Result<Json, Failure> {
     let about = book.of_modio()?;
     Ok(json!({

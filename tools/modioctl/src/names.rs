@@ -115,10 +115,6 @@ impl Book {
     }
 
     /// Returns the description of a unit that must be a modio.
-    ///
-    /// # Errors
-    ///
-    /// When the unit is another device.
     pub fn of_modio(&self) -> Result<&Description, Failure> {
         self.description().ok_or_else(|| {
             Failure::Refused(
@@ -160,11 +156,7 @@ impl Book {
         self.items.iter().filter(|item| item.setting)
     }
 
-    /// Returns the item with this name or address.
-    ///
-    /// # Errors
-    ///
-    /// When there is no such item; the error contains similar names.
+    /// Returns the item with this name or address. The error contains similar names.
     pub fn find(&self, name: &str) -> Result<Item, Failure> {
         let wanted = slug(name);
         if let Some(item) = self.items.iter().find(|item| slug(&item.name) == wanted) {

@@ -8,10 +8,6 @@ use std::path::Path;
 use crate::failure::Failure;
 
 /// Prints a line.
-///
-/// # Errors
-///
-/// When the line cannot be written, for example to a full disk.
 pub fn line(text: Arguments<'_>) -> Result<(), Failure> {
     let mut out = stdout().lock();
     match writeln!(out, "{text}").and_then(|()| out.flush()) {
@@ -22,20 +18,12 @@ pub fn line(text: Arguments<'_>) -> Result<(), Failure> {
 }
 
 /// Prints a value as JSON.
-///
-/// # Errors
-///
-/// When the output cannot be written.
 pub fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
     let text = serde_json::to_string_pretty(value).map_err(Failure::usage)?;
     line(format_args!("{text}"))
 }
 
 /// Prints rows in columns.
-///
-/// # Errors
-///
-/// When the output cannot be written.
 pub fn table<const COLUMNS: usize>(rows: &[[String; COLUMNS]]) -> Result<(), Failure> {
     let mut table = comfy_table::Table::new();
     table.load_preset(comfy_table::presets::NOTHING);
@@ -49,10 +37,6 @@ pub fn table<const COLUMNS: usize>(rows: &[[String; COLUMNS]]) -> Result<(), Fai
 }
 
 /// Creates a file. Overwrites an existing one only with `force`. A device or a pipe is no existing file.
-///
-/// # Errors
-///
-/// When the file exists or cannot be created.
 pub fn create(path: &Path, force: bool) -> Result<File, Failure> {
     if path.is_file() && !force {
         return Err(Failure::usage(format!(
@@ -64,10 +48,6 @@ pub fn create(path: &Path, force: bool) -> Result<File, Failure> {
 }
 
 /// Writes a text to a file, and reports that on standard error; or prints the text if no file is given.
-///
-/// # Errors
-///
-/// When the file exists, or the text cannot be written.
 pub fn save(text: &str, path: Option<&Path>, force: bool) -> Result<(), Failure> {
     let Some(path) = path else {
         return line(format_args!("{}", text.trim_end()));

@@ -141,11 +141,8 @@ pub fn unit_name(code: &str) -> &str {
     }
 }
 
-/// Returns the words for the value in `text`. With `raw` it is a register's number.
-///
-/// # Errors
-///
-/// When the item cannot be written, or the value is not allowed; the error contains the allowed values.
+/// Returns the words for the value in `text`. With `raw` it is a register's number. The error contains the allowed
+/// values.
 pub fn parse(item: &Item, text: &str, raw: bool) -> Result<Vec<u16>, Failure> {
     let name = &item.name;
     if !item.writable {

@@ -62,10 +62,6 @@ pub struct InProcess {
 }
 
 /// Starts a board fitted like this. Returns the master's end of its line.
-///
-/// # Errors
-///
-/// When the image cannot be read, or the device has no such setting.
 pub fn start(fitting: &Fitting) -> Result<ExactLine<InProcess>, Broken> {
     let image = Image::read(&fitting.elf).map_err(|e| Broken(e.to_string()))?;
     let unknown = || Broken(format!("the simulator does not know the {}", fitting.board));

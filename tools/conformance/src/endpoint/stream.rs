@@ -41,10 +41,6 @@ pub struct Stream {
 
 impl Stream {
     /// Opens a serial port or a pseudo-terminal.
-    ///
-    /// # Errors
-    ///
-    /// When the port cannot be opened, or does not support the format.
     pub fn serial(path: &Path, line: LineFormat) -> Result<Self, Broken> {
         let port = Port::open(path, line, SerialPort::open).map_err(Broken)?;
         let name = format!("{} at {line}", path.display());
@@ -52,10 +48,6 @@ impl Stream {
     }
 
     /// Connects to a socket; `line` is the rate and format of the line behind the socket.
-    ///
-    /// # Errors
-    ///
-    /// When no server answers at the address.
     pub fn tcp(address: &str, line: LineFormat) -> Result<Self, Broken> {
         let socket = connect(address)
             .map_err(|why| Broken(format!("cannot connect to {address}: {why}")))?;

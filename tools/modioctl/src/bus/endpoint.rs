@@ -138,10 +138,6 @@ fn address(text: &str) -> Result<String, String> {
 }
 
 /// Returns host and port of a network address.
-///
-/// # Errors
-///
-/// When the address has no port.
 pub fn host_and_port(address: &str) -> Result<(String, u16), String> {
     let (host, port) = address.rsplit_once(':').unwrap_or((address, ""));
     match port.parse() {
@@ -185,10 +181,6 @@ fn unit(text: &str) -> Result<u8, String> {
 }
 
 /// Parses a duration with its unit, or a number of seconds.
-///
-/// # Errors
-///
-/// A description of what is wrong with the text.
 pub fn duration(text: &str) -> Result<Duration, String> {
     let seconds = text.parse::<f64>().ok();
     let duration = match seconds.map(Duration::try_from_secs_f64) {
@@ -225,10 +217,6 @@ struct Elsewhere {
 impl Options {
     /// Returns the endpoint. Each option is from the command line, or else from the named endpoint, or else from
     /// the environment.
-    ///
-    /// # Errors
-    ///
-    /// When a value, a name or the file is wrong, or when no source gives the address of the unit.
     pub fn endpoint(self, at: Option<&str>, file: Option<&Path>) -> Result<Endpoint, Failure> {
         let environment = Self::from_environment()?;
         let variable = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
@@ -367,10 +355,6 @@ pub fn one_line(error: &clap::Error) -> String {
 }
 
 /// Returns the default file of named endpoints: `modio/endpoints.toml` in the system's directory for settings.
-///
-/// # Errors
-///
-/// When there is no home directory.
 pub fn usual_file() -> Result<PathBuf, Failure> {
     let strategy = etcetera::choose_base_strategy()
         .map_err(|_| Failure::usage("there is no home directory: give --endpoints FILE"))?;

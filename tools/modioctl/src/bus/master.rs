@@ -83,10 +83,6 @@ pub struct Master {
 
 impl Master {
     /// Opens the line.
-    ///
-    /// # Errors
-    ///
-    /// When the line cannot be opened; the error says why.
     pub async fn open(endpoint: Endpoint, observer: Option<Observer>) -> Result<Self, Failure> {
         Ok(Self {
             stream: Stream::open(&endpoint).await?,
@@ -116,11 +112,8 @@ impl Master {
         self.echo = Some(true);
     }
 
-    /// Changes rate, format and framing of the line.
-    ///
-    /// # Errors
-    ///
-    /// When the port does not support the settings. The line then keeps its present ones.
+    /// Changes rate, format and framing of the line. When the port does not support the settings, the line keeps its
+    /// present ones.
     pub fn change_line(&mut self, endpoint: Endpoint) -> Result<(), Failure> {
         self.stream.change(&endpoint)?;
         self.endpoint = endpoint;
@@ -133,12 +126,8 @@ impl Master {
         self.stream.discard_unsent();
     }
 
-    /// Sends a request to a unit, and repeats it as often as the endpoint says. Returns the PDU of the response,
-    /// which may be an exception.
-    ///
-    /// # Errors
-    ///
-    /// The failure of the last attempt, unless an earlier one was garbled.
+    /// Sends a request to a unit, and repeats it as often as the endpoint says. Returns the PDU of the response, which
+    /// may be an exception. The error is that of the last attempt, unless an earlier one was garbled.
     pub async fn ask(&mut self, unit: u8, pdu: &[u8]) -> Result<Vec<u8>, Lost> {
         if self.echo.is_none() && !differs(pdu) {
             self.look_for_echo(unit).await?;
@@ -171,10 +160,6 @@ impl Master {
     }
 
     /// Sends a broadcast to all units.
-    ///
-    /// # Errors
-    ///
-    /// Errors of the port.
     pub async fn tell_all(&mut self, pdu: &[u8]) -> io::Result<()> {
         self.send(0, pdu).await?;
         self.free = self.free.max(Instant::now() + TURNAROUND);
@@ -243,10 +228,6 @@ impl Master {
     }
 
     /// Reads once, until `until` at most. Returns 0 when nothing was received.
-    ///
-    /// # Errors
-    ///
-    /// Errors of the port.
     pub async fn read_until(&mut self, until: Instant, into: &mut Vec<u8>) -> io::Result<usize> {
         let mut chunk = [0; 512];
         match timeout_at(until, self.stream.read(&mut chunk)).await {

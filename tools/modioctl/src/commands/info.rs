@@ -49,10 +49,6 @@ const fn group(address: u16) -> &'static str {
 }
 
 /// Shows identity, state and counters of the unit.
-///
-/// # Errors
-///
-/// When the unit does not answer or refuses.
 pub async fn run(device: &mut Device, json: bool) -> Result<(), Failure> {
     let mut identity = match identity(device).await {
         Err(Unidentified::Lost(lost)) => return Err(device.lost(&lost)),
@@ -140,10 +136,6 @@ impl fmt::Display for Unidentified {
 }
 
 /// Returns the objects of the device identification.
-///
-/// # Errors
-///
-/// The reason why there are none.
 pub async fn identity(device: &mut Device) -> Result<Vec<(String, String)>, Unidentified> {
     let mut found = Vec::new();
     let mut object = 0;

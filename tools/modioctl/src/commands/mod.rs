@@ -29,10 +29,6 @@ use config::Note;
 const INTERRUPTED: u8 = 130;
 
 /// Runs the command of the command line, until it is done or Ctrl-C is pressed.
-///
-/// # Errors
-///
-/// The reason why the command failed.
 pub async fn run(mut cli: Cli) -> Result<ExitCode, Failure> {
     let until_stopped = matches!(
         cli.command,

@@ -11,10 +11,6 @@ use crate::output;
 use crate::value::{parse, show};
 
 /// Sets up a slot for a module.
-///
-/// # Errors
-///
-/// When the unit does not have the port or the module, does not answer or refuses.
 pub async fn run(mut device: Device, options: Module) -> Result<(), Failure> {
     let Module::Set { port, module } = options;
     let book = fetch(&mut device).await?.book;
@@ -55,10 +51,6 @@ pub async fn run(mut device: Device, options: Module) -> Result<(), Failure> {
 }
 
 /// Restarts the unit.
-///
-/// # Errors
-///
-/// When the unit does not answer or refuses.
 pub async fn reboot(mut device: Device) -> Result<(), Failure> {
     device.unlock().await?;
     device.warn_of_restart().await?;
@@ -78,10 +70,6 @@ pub async fn reboot(mut device: Device) -> Result<(), Failure> {
 }
 
 /// Makes the unit blink its LEDs.
-///
-/// # Errors
-///
-/// When the unit does not answer or refuses.
 pub async fn identify(device: &mut Device) -> Result<(), Failure> {
     device.unlock().await?;
     device

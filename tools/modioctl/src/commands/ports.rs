@@ -7,10 +7,6 @@ use crate::failure::Failure;
 use crate::output;
 
 /// Lists the serial ports with the known data of their adapters.
-///
-/// # Errors
-///
-/// When the system does not list its ports.
 pub fn run(json: bool) -> Result<(), Failure> {
     let ports = available_ports().map_err(|error| {
         Failure::Port(format!(

@@ -7,10 +7,6 @@ use crate::failure::Failure;
 use crate::output;
 
 /// Sends a PDU and shows both frames.
-///
-/// # Errors
-///
-/// When the digits are wrong, the unit does not answer, or the answer is an exception.
 pub async fn run(device: &mut Device, options: &Raw) -> Result<(), Failure> {
     let pdu = hex(&options.pdu.concat())?;
     let framing = device.master.endpoint().framing;

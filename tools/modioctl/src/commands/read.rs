@@ -10,10 +10,6 @@ use crate::output;
 use crate::value::show;
 
 /// Reads items by name or address.
-///
-/// # Errors
-///
-/// When a name is unknown, or the unit does not answer or refuses.
 pub async fn run(device: &mut Device, options: &Read, json: bool) -> Result<(), Failure> {
     let book = fetch(device).await?.book;
     let items: Vec<Item> = options
@@ -25,10 +21,6 @@ pub async fn run(device: &mut Device, options: &Read, json: bool) -> Result<(), 
 }
 
 /// Reads items and prints their values. With `raw` they are numbers without meaning.
-///
-/// # Errors
-///
-/// When the unit does not answer or refuses.
 pub async fn print(
     device: &mut Device,
     items: &[Item],

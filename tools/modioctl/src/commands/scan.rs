@@ -41,11 +41,7 @@ struct Scanned {
 }
 
 /// Looks for units at the requested rates and formats. Ctrl-C ends the scan, and keeps what was found. Returns whether
-/// the scan has ended by itself.
-///
-/// # Errors
-///
-/// When no unit was found, or when only garbled answers were received.
+/// the scan has ended by itself. Fails when no unit was found.
 pub async fn run(
     endpoint: Endpoint,
     observer: Option<Observer>,
@@ -266,11 +262,8 @@ impl Scanned {
     }
 }
 
-/// Reads the identity of a unit.
-///
-/// # Errors
-///
-/// When its answers are garbled, as those of two units with one address are, or when the port is lost.
+/// Reads the identity of a unit. Fails when its answers are garbled, as those of two units with one address are, or
+/// when the port is lost.
 async fn look_at(device: &mut Device) -> Result<Unit, Failure> {
     // Use what the unit does answer, even if it does not answer every request.
     fn answered<T: Default>(result: Result<T, Failure>) -> Result<T, Failure> {

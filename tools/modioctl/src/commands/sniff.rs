@@ -26,10 +26,6 @@ const BATCH: Duration = Duration::from_millis(60);
 const ASCII_IDLE: Duration = Duration::from_secs(1);
 
 /// Shows the frames on the line until the program is stopped. Sends nothing.
-///
-/// # Errors
-///
-/// When the line cannot be opened or is lost, or when the capture file cannot be written.
 pub async fn run(endpoint: &Endpoint, options: &Sniff, json: bool) -> Result<(), Failure> {
     if matches!(endpoint.place, Place::ModbusTcp(_)) {
         return Err(Failure::usage(

@@ -12,10 +12,6 @@ use crate::output::{self, csv_field};
 use crate::value::{Shown, show};
 
 /// Prints values until it is stopped. Waits for a unit that is lost.
-///
-/// # Errors
-///
-/// When a name is unknown, or when the unit refuses.
 pub async fn run(mut device: Device, options: &Watch) -> Result<(), Failure> {
     let items = chosen(&fetch(&mut device).await?.book, &options.names)?;
     if options.csv {
@@ -69,10 +65,6 @@ async fn reconnect(device: Device, endpoint: crate::bus::Endpoint) -> Device {
 }
 
 /// Returns the items with these names, or all points without names.
-///
-/// # Errors
-///
-/// When a name is unknown, or when there are no points.
 pub fn chosen(book: &Book, names: &[String]) -> Result<Vec<Item>, Failure> {
     if !names.is_empty() {
         return names.iter().map(|name| book.find(name)).collect();

@@ -9,11 +9,8 @@ use crate::names::Item;
 use crate::output;
 use crate::value::{parse, show};
 
-/// Writes items by name or address, after all of them have been checked.
-///
-/// # Errors
-///
-/// When a name or a value is wrong; nothing is written then. When the unit does not answer or refuses.
+/// Writes items by name or address, after all of them have been checked. When a name or a value is wrong, nothing is
+/// written.
 pub async fn run(device: &mut Device, options: &Write) -> Result<(), Failure> {
     let book = fetch(device).await?.book;
     let mut checked = Vec::new();
@@ -55,10 +52,6 @@ pub async fn run(device: &mut Device, options: &Write) -> Result<(), Failure> {
 
 impl Device {
     /// Writes an item.
-    ///
-    /// # Errors
-    ///
-    /// When the unit does not answer or refuses.
     pub async fn write_item(&mut self, item: &Item, words: &[u16]) -> Result<(), Failure> {
         let about = format!("writing {}", item.name);
         match (item.table, words) {

@@ -29,10 +29,6 @@ pub struct Learned {
 }
 
 /// Learns the names of a unit. A unit that is not a modio has no names, only addresses.
-///
-/// # Errors
-///
-/// When the unit does not answer, or when its description cannot be read.
 pub async fn fetch(device: &mut Device) -> Result<Learned, Failure> {
     let Some((description, source)) = description(device).await? else {
         return Ok(Learned {
@@ -89,10 +85,6 @@ async fn description(device: &mut Device) -> Result<Option<(Description, String)
 
 /// Returns what this program knows about the unit from its own register map, without asking for the unit's
 /// description; `None` for a unit that is not a modio, or whose board is newer than this program.
-///
-/// # Errors
-///
-/// When the unit does not answer.
 pub async fn known(device: &mut Device) -> Result<Option<Description>, Failure> {
     let head = match device.read_words(state::PRODUCT_CODE, 6).await {
         Ok(head) => head,

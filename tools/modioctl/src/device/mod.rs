@@ -6,7 +6,7 @@ mod several;
 
 use modbus_line::names;
 
-pub use learn::{Learned, fetch, known};
+pub use learn::{fetch, known};
 pub use orders::with_modules;
 
 use crate::bus::endpoint::{Endpoint, Place};
@@ -32,10 +32,6 @@ pub struct Device {
 
 impl Device {
     /// Opens the line to the endpoint's unit.
-    ///
-    /// # Errors
-    ///
-    /// When the line cannot be opened; the error says why.
     pub async fn open(endpoint: Endpoint, observer: Option<Observer>) -> Result<Self, Failure> {
         let unit = endpoint.unit;
         let master = Master::open(endpoint, observer).await?;
@@ -47,10 +43,6 @@ impl Device {
     }
 
     /// Sends a request. An exception is a failure; `about` describes the request in its text.
-    ///
-    /// # Errors
-    ///
-    /// When the unit does not answer or refuses.
     pub async fn ask(&mut self, pdu: &[u8], about: &str) -> Result<Vec<u8>, Failure> {
         match self.master.ask(self.unit, pdu).await {
             Ok(response) => match response[..] {
@@ -62,10 +54,6 @@ impl Device {
     }
 
     /// Reads registers from `first` on, by function 03.
-    ///
-    /// # Errors
-    ///
-    /// When the unit does not answer or refuses.
     pub async fn read_words(&mut self, first: u16, count: u16) -> Result<Vec<u16>, Failure> {
         let mut words = Vec::new();
         let mut done = 0;
@@ -83,10 +71,6 @@ impl Device {
     }
 
     /// Reads bits from `first` on, by function 01.
-    ///
-    /// # Errors
-    ///
-    /// When the unit does not answer or refuses.
     pub async fn read_bits(&mut self, first: u16, count: u16) -> Result<Vec<bool>, Failure> {
         let count = count.min(MOST_BITS);
         let request = head(1, first, count);
@@ -100,10 +84,6 @@ impl Device {
     }
 
     /// Writes registers: a single one by function 06, several by function 10.
-    ///
-    /// # Errors
-    ///
-    /// When the unit does not answer or refuses; `about` describes the write.
     pub async fn write_words(
         &mut self,
         first: u16,
@@ -125,10 +105,6 @@ impl Device {
     }
 
     /// Writes one bit, by function 05.
-    ///
-    /// # Errors
-    ///
-    /// When the unit does not answer or refuses; `about` describes the write.
     pub async fn write_bit(&mut self, address: u16, on: bool, about: &str) -> Result<(), Failure> {
         let word = if on { 0xFF00 } else { 0 };
         self.ask(&head(5, address, word), about).await?;
@@ -136,10 +112,6 @@ impl Device {
     }
 
     /// Reads records of a file, by function 14, as bytes.
-    ///
-    /// # Errors
-    ///
-    /// When the unit does not answer or refuses.
     pub async fn read_records(
         &mut self,
         file: u16,

@@ -24,29 +24,17 @@ const PAUSE: Duration = Duration::from_millis(100);
 
 impl Device {
     /// Opens the lock of the settings, for a minute.
-    ///
-    /// # Errors
-    ///
-    /// When the unit does not answer or refuses.
     pub async fn unlock(&mut self) -> Result<(), Failure> {
         self.write_words(KEY, &[OPENING_KEY], "opening the lock")
             .await
     }
 
     /// Writes a command. The lock must be open.
-    ///
-    /// # Errors
-    ///
-    /// When the unit does not answer or refuses.
     pub async fn order(&mut self, command: u16, about: &str) -> Result<(), Failure> {
         self.write_words(COMMAND, &[command], about).await
     }
 
     /// Saves the settings, and waits until they are saved.
-    ///
-    /// # Errors
-    ///
-    /// When the unit does not answer or refuses.
     pub async fn save(&mut self) -> Result<(), Failure> {
         self.order(Command::Save.code(), "saving").await?;
         let until = Instant::now() + SAVING;
@@ -67,10 +55,6 @@ impl Device {
     /// Restarts the unit and waits until it answers. It may answer with the line settings that it had, because a restart
     /// loses what is not saved, and because a gateway in front of it keeps its own; or with those that its registers
     /// announce. Both are tried in turn. The lock must be open.
-    ///
-    /// # Errors
-    ///
-    /// When the unit does not answer or refuses.
     pub async fn restart(mut self) -> Result<Self, Failure> {
         let line = self.read_words(BAUD, 3).await?;
         let before = self.uptime().await?;
@@ -155,10 +139,6 @@ impl Device {
 
     /// Prints a warning when a saved change waits for a restart that may be one of the line, and the connection is a
     /// gateway.
-    ///
-    /// # Errors
-    ///
-    /// When the unit does not answer or refuses.
     pub async fn warn_of_restart(&mut self) -> Result<(), Failure> {
         let status = self.read_words(state::STATUS, 1).await?;
         let waits = status.iter().any(|word| word & status::RESTART_NEEDED != 0);

@@ -57,10 +57,6 @@ pub struct Source {
 }
 
 /// Returns the text of a configuration.
-///
-/// # Errors
-///
-/// When a unit is not a modio, or when the system cannot use the endpoint.
 pub fn text(format: ExportFormat, line: Line<'_>) -> Result<String, Failure> {
     match format {
         ExportFormat::Csv => csv::text(line),

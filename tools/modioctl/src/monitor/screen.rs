@@ -28,10 +28,6 @@ pub struct Screen {
 
 impl Screen {
     /// Prepares the terminal and reads its events.
-    ///
-    /// # Errors
-    ///
-    /// When the terminal cannot be used; the error says why.
     pub fn open() -> Result<(Self, UnboundedReceiver<io::Result<Event>>), Failure> {
         let terminal = ratatui::try_init().map_err(|error| {
             ratatui::restore();

@@ -16,10 +16,6 @@ use crate::names::{Book, Item, Meaning, port_of, slots};
 use crate::value::{parse, show, takes};
 
 /// Returns the text of a file.
-///
-/// # Errors
-///
-/// When the unit is not a modio.
 pub fn text(book: &Book, items: &[Item], values: &[Vec<u16>]) -> Result<String, Failure> {
     let about = book.of_modio()?;
     let mut text = format!(
@@ -75,11 +71,8 @@ struct Line {
     value: String,
 }
 
-/// Reads the settings in a file and checks all of them, with the modules in the file.
-///
-/// # Errors
-///
-/// When the file cannot be read or is of another board, or all lines that are wrong.
+/// Reads the settings in a file and checks all of them, with the modules in the file. The error has all lines that are
+/// wrong.
 pub fn read(book: &Book, path: &Path) -> Result<Vec<Setting>, Failure> {
     let shown = path.display().to_string();
     let text = std::fs::read_to_string(path)
@@ -216,10 +209,6 @@ fn with_modules(book: &Book, lines: &[Line]) -> Result<(Book, Vec<Option<u8>>), 
 }
 
 /// Checks a name and a value.
-///
-/// # Errors
-///
-/// When one of them is wrong.
 pub fn setting(book: &Book, name: &str, value: &str) -> Result<Setting, Failure> {
     let item = book.find(name)?;
     if !item.setting {

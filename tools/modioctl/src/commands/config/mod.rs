@@ -27,11 +27,7 @@ type Setting = (Item, Vec<u16>);
 /// Text that Ctrl-C prints: how much of the command is done.
 pub type Note = RefCell<String>;
 
-/// Reads and changes settings.
-///
-/// # Errors
-///
-/// When a name, a value or a file is wrong; nothing is written then. When the unit does not answer or refuses.
+/// Reads and changes settings. When a name, a value or a file is wrong, nothing is written.
 pub async fn run(
     mut device: Device,
     options: Config,
@@ -236,11 +232,8 @@ fn table(mut rows: Vec<[String; 3]>, other: &str) -> Result<(), Failure> {
     output::table(&rows)
 }
 
-/// Asks whether the modules with these names may be changed.
-///
-/// # Errors
-///
-/// When the answer is not yes, or when nobody can answer.
+/// Asks whether the modules with these names may be changed. Fails when the answer is not yes, or when nobody can
+/// answer.
 async fn agree(modules: &str) -> Result<(), Failure> {
     let mut answer = String::new();
     if stdin().is_terminal() {
