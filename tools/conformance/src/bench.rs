@@ -68,19 +68,16 @@ impl<'a> Bench<'a> {
     }
 
     /// Returns the unit's address.
-    #[must_use]
     pub fn unit(&self) -> u8 {
         self.target.unit
     }
 
     /// Another unit's address, an ordinary one.
-    #[must_use]
     pub fn other(&self) -> u8 {
         if self.target.unit == 42 { 43 } else { 42 }
     }
 
     /// Returns the frame of a request to this unit.
-    #[must_use]
     pub fn frame(&self, pdu: &[u8]) -> Vec<u8> {
         self.target.mode.frame(self.target.unit, pdu)
     }
@@ -277,13 +274,11 @@ impl<'a> Bench<'a> {
     }
 
     /// Returns the frame of the request of [`Bench::alive`].
-    #[must_use]
     pub fn ping(&self) -> Vec<u8> {
         self.frame(&self.target.ping)
     }
 
     /// Returns whether a reply is right for the request of [`Bench::alive`].
-    #[must_use]
     pub fn is_pong(&self, reply: &Reply) -> bool {
         matches!(reply, Reply::Pdu(pdu) if pdu[0] == self.target.ping[0])
     }
@@ -307,7 +302,6 @@ impl<'a> Bench<'a> {
 }
 
 /// Returns two runs of bytes with a gap between them.
-#[must_use]
 pub fn apart(first: &[u8], gap: Duration, second: &[u8]) -> [Piece; 3] {
     [
         Piece::Bytes(first.to_vec()),
@@ -317,7 +311,6 @@ pub fn apart(first: &[u8], gap: Duration, second: &[u8]) -> [Piece; 3] {
 }
 
 /// Returns a frame in which the character at `index` is damaged in this way.
-#[must_use]
 pub fn damaged_at(frame: &[u8], index: usize, damage: fn(u8) -> Piece) -> [Piece; 3] {
     [
         Piece::Bytes(frame[..index].to_vec()),

@@ -135,7 +135,6 @@ fn setting(text: &str) -> Result<(u16, u16), String> {
 
 impl Cli {
     /// Returns the line's rate and format.
-    #[must_use]
     pub fn line(&self) -> LineFormat {
         LineFormat::new(self.baud, self.format)
     }
@@ -150,7 +149,6 @@ impl Cli {
     }
 
     /// Returns the unit's address.
-    #[must_use]
     pub fn unit(&self, profile: Option<&Profile>) -> u8 {
         let unit = self.unit.or_else(|| profile.and_then(|p| p.unit));
         #[cfg(feature = "sim")]
@@ -211,7 +209,6 @@ impl Cli {
     }
 
     /// Returns the waiting times on this endpoint.
-    #[must_use]
     pub fn waits(&self, endpoint: &dyn Endpoint) -> Patience {
         waits(endpoint, self.patience.map(Duration::from_millis))
     }
@@ -246,7 +243,6 @@ pub fn chosen(parts: &[String]) -> Result<Vec<Case>> {
 
 /// Returns the waiting times on an endpoint. Where time is exact, the line sets them. Elsewhere they allow for a slow
 /// operating system, and for a simulator that is slower than its clock.
-#[must_use]
 pub fn waits(endpoint: &dyn Endpoint, reply: Option<Duration>) -> Patience {
     let line = endpoint.line();
     if endpoint.abilities().exact {

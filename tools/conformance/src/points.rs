@@ -7,20 +7,17 @@ use crate::case::{Check, Stop};
 use crate::target::{Span, Words};
 
 /// Returns a request's function, address and one more word.
-#[must_use]
 pub fn pdu(function: u8, address: u16, word: u16) -> Vec<u8> {
     let ([ah, al], [wh, wl]) = (address.to_be_bytes(), word.to_be_bytes());
     vec![function, ah, al, wh, wl]
 }
 
 /// Returns a request of function 08.
-#[must_use]
 pub fn diagnose(sub: u16, data: &[u8]) -> Vec<u8> {
     [&[8], &sub.to_be_bytes()[..], data].concat()
 }
 
 /// Returns a write of several registers, 0x10.
-#[must_use]
 pub fn write_words(address: u16, values: &[u16]) -> Vec<u8> {
     let mut request = pdu(0x10, address, values.len() as u16);
     request.push((values.len() * 2) as u8);
@@ -29,7 +26,6 @@ pub fn write_words(address: u16, values: &[u16]) -> Vec<u8> {
 }
 
 /// Returns a write of several coils, 0x0F; the padding bits of the last byte are `padding`.
-#[must_use]
 pub fn write_bits(address: u16, values: &[bool], padding: bool) -> Vec<u8> {
     let mut request = pdu(0x0F, address, values.len() as u16);
     request.push(values.len().div_ceil(8) as u8);
@@ -43,7 +39,6 @@ pub fn write_bits(address: u16, values: &[bool], padding: bool) -> Vec<u8> {
 }
 
 /// Returns the words of a reply to 03, 04 or 17.
-#[must_use]
 pub fn words_of(reply: &[u8]) -> Vec<u16> {
     let (pairs, _) = reply.get(2..).unwrap_or_default().as_chunks::<2>();
     pairs.iter().map(|pair| u16::from_be_bytes(*pair)).collect()
@@ -89,7 +84,6 @@ impl Bench<'_> {
 
     /// Returns the addresses next to what a function (1 to 4) reads, and 0xFFFF, as far as the function cannot read
     /// them.
-    #[must_use]
     pub fn outside(&self, function: u8) -> Vec<u16> {
         let spans = self.target.readable(function);
         let mut outside = vec![0xFFFF];

@@ -19,7 +19,6 @@ pub struct Span {
 
 impl Span {
     /// Returns a span of one address.
-    #[must_use]
     pub const fn one(address: u16) -> Self {
         Self {
             first: address,
@@ -28,19 +27,16 @@ impl Span {
     }
 
     /// Returns the number of addresses, 1 to 65536.
-    #[must_use]
     pub fn len(self) -> u32 {
         u32::from(self.last - self.first) + 1
     }
 
     /// Always false: a span has at least one address.
-    #[must_use]
     pub const fn is_empty(self) -> bool {
         false
     }
 
     /// Returns the first addresses, `most` at most.
-    #[must_use]
     pub fn up_to(self, most: u16) -> Self {
         let last = self.first.saturating_add(most.saturating_sub(1));
         Self {
@@ -50,7 +46,6 @@ impl Span {
     }
 
     /// Returns whether the span contains the address.
-    #[must_use]
     pub const fn has(self, address: u16) -> bool {
         self.first <= address && address <= self.last
     }
@@ -103,7 +98,6 @@ impl Modio {
     }
 
     /// Returns the module in the first slot.
-    #[must_use]
     pub fn module(&self) -> Module {
         self.slots()
             .next()
@@ -118,7 +112,6 @@ impl Modio {
     }
 
     /// Returns the runs of neighbouring points of these kinds.
-    #[must_use]
     pub fn runs(&self, kinds: &[Kind]) -> Vec<Span> {
         let mut runs: Vec<Span> = Vec::new();
         for (address, _) in self.points().filter(|(_, kind)| kinds.contains(kind)) {
@@ -172,7 +165,6 @@ pub struct Target {
 
 impl Target {
     /// Returns the runs that this function (1 to 4) reads.
-    #[must_use]
     pub fn readable(&self, function: u8) -> &[Span] {
         match function {
             1..=4 => &self.readable[usize::from(function) - 1],
@@ -181,20 +173,17 @@ impl Target {
     }
 
     /// Returns the longest run that this function reads.
-    #[must_use]
     pub fn longest(&self, function: u8) -> Option<Span> {
         let spans = self.readable(function).iter().copied();
         spans.max_by_key(|span| (span.len(), u16::MAX - span.first))
     }
 
     /// Returns whether the unit has this function.
-    #[must_use]
     pub fn has(&self, function: u8) -> bool {
         self.functions.get(&function) == Some(&Support::Yes)
     }
 
     /// Returns the highest address that this function (1 to 4) cannot read.
-    #[must_use]
     pub fn nowhere(&self, function: u8) -> Option<u16> {
         let spans = self.readable(function);
         (0..=u16::MAX)
@@ -203,7 +192,6 @@ impl Target {
     }
 
     /// Returns the highest address without a coil, or without a register, for a function that writes.
-    #[must_use]
     pub fn nowhere_to_write(&self, function: u8) -> Option<u16> {
         match function {
             5 | 15 => self.nowhere(1),

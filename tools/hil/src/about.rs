@@ -64,7 +64,6 @@ pub struct Unit {
 
 impl About {
     /// Describes this computer, this port, this instant, and the commit of this program. The unit is added later.
-    #[must_use]
     pub fn here(port: Option<&Path>, commit: &str) -> Self {
         Self {
             date: Utc::now().to_rfc3339_opts(SecondsFormat::Secs, true),
@@ -83,7 +82,6 @@ impl About {
     }
 
     /// Names and values, in the order in which they are reported.
-    #[must_use]
     pub fn properties(&self) -> Vec<(&'static str, String)> {
         let mut all = vec![
             ("date", self.date.clone()),
@@ -105,7 +103,6 @@ impl About {
     }
 
     /// Returns the description in JSON. Unknown values are null.
-    #[must_use]
     pub fn json(&self) -> Value {
         json!({
             "date": self.date,

@@ -60,7 +60,6 @@ impl fmt::Display for Finding {
 
 impl Report {
     /// Counts the results of the cases and of the other tests.
-    #[must_use]
     pub fn totals(&self) -> Totals {
         let mut totals = Totals::of(&self.outcomes);
         for finding in &self.findings {
@@ -80,7 +79,6 @@ impl Report {
     }
 
     /// Returns a JUnit document: a suite for the cases and one for the other tests.
-    #[must_use]
     pub fn junit(&self) -> String {
         let tests = self.findings.iter().map(|finding| Test {
             name: &finding.name,
@@ -102,7 +100,6 @@ impl Report {
     }
 
     /// Returns the results, and the times of the requests at each rate, in JSON.
-    #[must_use]
     pub fn json(&self) -> Value {
         let totals = self.totals();
         let findings: Vec<Value> = self

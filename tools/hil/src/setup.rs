@@ -55,7 +55,6 @@ impl Cli {
 
 impl Setup {
     /// Returns the serial port, if the line is on one.
-    #[must_use]
     pub fn port(&self) -> Option<&Path> {
         let port = self.cli.port.as_deref().or(self.file.port.as_deref());
         port.filter(|_| self.cli.tcp.is_none())
@@ -85,7 +84,6 @@ impl Setup {
     }
 
     /// Returns how to write the image, if the image is written.
-    #[must_use]
     pub fn flash(&self) -> Option<Flash> {
         let probe = self.cli.probe.as_ref().or(self.file.probe.as_ref());
         self.cli.flash.then(|| Flash {
@@ -95,7 +93,6 @@ impl Setup {
     }
 
     /// Returns the command that resets the board, if there is one.
-    #[must_use]
     pub fn reset(&self) -> Option<&str> {
         let command = self.cli.reset_cmd.as_deref();
         command.or(self.file.reset_cmd.as_deref())

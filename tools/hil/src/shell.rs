@@ -63,7 +63,6 @@ pub struct Powered {
 
 impl Powered {
     /// Returns a line to a unit whose power is on. `command`, followed by `off` or `on`, switches its power.
-    #[must_use]
     pub const fn new(line: Box<dyn Endpoint>, command: String) -> Self {
         Self {
             line,

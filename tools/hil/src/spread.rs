@@ -17,7 +17,6 @@ pub struct Spread {
 
 impl Spread {
     /// Sorts times; `None` when there are none.
-    #[must_use]
     pub fn of(mut times: Vec<Duration>) -> Option<Self> {
         times.sort_unstable();
         (!times.is_empty()).then_some(Self { times })
@@ -25,7 +24,6 @@ impl Spread {
 
     /// Returns the time that `percent` of a hundred times do not exceed, by the nearest rank: 0 is the minimum, 50 the
     /// median, 100 the maximum. Each result is a time that was measured.
-    #[must_use]
     pub fn percentile(&self, percent: u8) -> Duration {
         let count = self.times.len();
         let rank = (count * usize::from(percent.min(100))).div_ceil(100);
@@ -33,7 +31,6 @@ impl Spread {
     }
 
     /// Returns a line for each step from the minimum to the 99th percentile, and one line for longer times.
-    #[must_use]
     pub fn histogram(&self) -> String {
         let (first, top) = (
             self.percentile(0).as_micros(),

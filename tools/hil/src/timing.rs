@@ -48,7 +48,6 @@ pub struct Tally {
 const TOLERANCE: Duration = Duration::from_micros(1);
 
 /// Returns the shortest time that this number of requests takes at the line's rate.
-#[must_use]
 pub fn least(bench: &Bench<'_>, requests: u32) -> Duration {
     let line = bench.endpoint.line();
     let frame = bench.frame(&echo(0)).len();
@@ -120,7 +119,6 @@ pub fn measure(bench: &mut Bench<'_>, requests: u32, stop: &AtomicBool) -> Check
 impl Tally {
     /// Passes when every request got its reply, no reply was early, and 99 of 100 turnarounds are within the limit, if
     /// there is a limit.
-    #[must_use]
     pub fn verdict(&self, limit: Option<Duration>) -> Verdict {
         let bad = |came: String, wanted: String| {
             Verdict::Failed(Failure {

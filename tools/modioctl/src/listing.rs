@@ -31,7 +31,6 @@ fn unit(item: &Item) -> Unit {
 }
 
 /// Returns the allowed values of an item, for people.
-#[must_use]
 pub fn values(item: &Item) -> String {
     let unit = unit(item);
     match (&item.values, &item.meaning) {

@@ -38,7 +38,6 @@ pub struct Item {
 
 impl Item {
     /// Returns whether a value is allowed. Every value is when the allowed ones are not known.
-    #[must_use]
     pub fn allows(&self, word: u16) -> bool {
         match &self.values {
             None => true,
@@ -84,7 +83,6 @@ pub struct Book {
 
 impl Book {
     /// Creates the names of a unit. `readings` contains RANGE and SCALE of every point.
-    #[must_use]
     pub fn new(description: Description, readings: Vec<(u16, u16)>) -> Self {
         let mut items = points(&description, &readings);
         for register in &description.registers {
@@ -97,19 +95,16 @@ impl Book {
     }
 
     /// Returns the unit's description; `None` for a unit that is not a modio.
-    #[must_use]
     pub const fn description(&self) -> Option<&Description> {
         self.description.as_ref()
     }
 
     /// Returns all items: the points, then the registers in the order of their addresses.
-    #[must_use]
     pub fn items(&self) -> &[Item] {
         &self.items
     }
 
     /// Returns the item with exactly this name.
-    #[must_use]
     pub fn item(&self, name: &str) -> Option<&Item> {
         self.items.iter().find(|item| item.name == name)
     }
@@ -131,7 +126,6 @@ impl Book {
     }
 
     /// Returns the ports with a slot and their points, including points whose values have no known meaning.
-    #[must_use]
     pub fn ports(&self) -> Vec<PortItems> {
         let Some(description) = &self.description else {
             return Vec::new();
@@ -223,13 +217,11 @@ pub fn number_of(text: &str) -> Option<u16> {
 }
 
 /// Returns the number of a port: `p5` or `5`.
-#[must_use]
 pub fn port_number(text: &str) -> Option<u8> {
     text.strip_prefix(['p', 'P']).unwrap_or(text).parse().ok()
 }
 
 /// Returns the port in a name such as `p5.1.filter` or `5.module`.
-#[must_use]
 pub fn port_of(name: &str) -> Option<u8> {
     port_number(name.trim().split_once('.')?.0)
 }
@@ -241,13 +233,11 @@ fn module(description: &Description, code: u16) -> Option<&ModuleType> {
 }
 
 /// Returns the name of the module with this code; `unknown` for a code without a name.
-#[must_use]
 pub fn module_name(description: &Description, code: u16) -> &str {
     module(description, code).map_or("unknown", |module| &module.name)
 }
 
 /// Lists the ports with a slot, for people.
-#[must_use]
 pub fn slots(description: &Description) -> String {
     let ports = description.ports.iter();
     let ports: Vec<_> = ports.map(|port| port.number.to_string()).collect();

@@ -65,7 +65,6 @@ pub fn not_written(path: &Path, error: &io::Error) -> Failure {
 
 /// Returns a text as a field of a CSV file (RFC 4180). A text that a spreadsheet would calculate gets `'` in front; a
 /// number stays a number.
-#[must_use]
 pub fn csv_field(text: &str) -> String {
     let is_number = text.parse().is_ok_and(f64::is_finite);
     let is_formula = text.len() > 1 && text.starts_with(['=', '+', '-', '@']) && !is_number;

@@ -27,7 +27,6 @@ impl std::fmt::Display for Shown {
 }
 
 /// Formats the words of an item. With `raw` they are shown as numbers without meaning.
-#[must_use]
 pub fn show(item: &Item, words: &[u16], raw: bool) -> Shown {
     let first = words.first().copied().unwrap_or_default();
     match &item.meaning {
@@ -53,7 +52,6 @@ fn signed(word: u16, min: i32) -> i64 {
 }
 
 /// Returns the number in two words, high word first.
-#[must_use]
 pub fn long(words: &[u16]) -> u32 {
     words
         .iter()
@@ -131,7 +129,6 @@ fn decimal(number: i64, exponent: i8) -> String {
 }
 
 /// Returns the name of a UCUM unit for people.
-#[must_use]
 pub fn unit_name(code: &str) -> &str {
     match code {
         "Cel" => "°C",
@@ -243,7 +240,6 @@ fn steps(text: &str, unit: &Unit) -> Option<i64> {
 }
 
 /// Describes the values that a register allows, in its unit.
-#[must_use]
 pub fn takes(values: &Values, unit: &Unit) -> String {
     match values {
         Values::Range(min, max) => range((*min).into(), (*max).into(), unit),
@@ -281,13 +277,11 @@ fn range(min: i64, max: i64, unit: &Unit) -> String {
 }
 
 /// Describes the quantities of a range of numbers, such as `0 to 10000 mV`.
-#[must_use]
 pub fn quantities(min: i64, max: i64, unit: &Unit) -> String {
     format!("{} to {}", number(min, unit).text, number(max, unit))
 }
 
 /// Returns the name of a table, for people.
-#[must_use]
 pub const fn table_name(table: Table) -> &'static str {
     match table {
         Table::Bit => "bit",

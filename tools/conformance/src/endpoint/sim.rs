@@ -40,7 +40,6 @@ pub struct Fitting {
 
 impl Fitting {
     /// Returns a board with this image and empty slots, set as in the factory: address 1, 9600 8N2, RTU.
-    #[must_use]
     pub fn new(elf: PathBuf, board: &'static register_map::Board) -> Self {
         Self {
             elf,

@@ -29,7 +29,6 @@ pub enum Place {
 
 impl Place {
     /// Returns whether a change of the unit's line settings also concerns this computer's port.
-    #[must_use]
     pub const fn is_serial(&self) -> bool {
         matches!(self, Self::Serial(_))
     }
@@ -58,14 +57,12 @@ pub struct Endpoint {
 
 impl Endpoint {
     /// Returns rate and format of the line.
-    #[must_use]
     pub const fn line(&self) -> LineFormat {
         LineFormat::new(self.baud, self.format)
     }
 
     /// Returns the duration of `bytes` bytes on the line, also for a gateway in transparent mode. Returns zero for
     /// Modbus TCP, whose server handles the timing of its line itself.
-    #[must_use]
     pub fn time_of(&self, bytes: usize) -> Duration {
         if self.framing == Framing::Mbap {
             return Duration::ZERO;
@@ -74,7 +71,6 @@ impl Endpoint {
     }
 
     /// Returns the silence between frames on a serial line: t3.5, in characters of the line's format.
-    #[must_use]
     pub fn frame_gap(&self) -> Duration {
         match self.framing {
             Framing::Mbap => Duration::ZERO,
@@ -341,7 +337,6 @@ impl Options {
 }
 
 /// Returns clap's message as one line, without its heading and the usage.
-#[must_use]
 pub fn one_line(error: &clap::Error) -> String {
     let text = error.to_string();
     let is_about_error = |line: &&str| {

@@ -96,13 +96,11 @@ impl Master {
     }
 
     /// Returns the settings of the line.
-    #[must_use]
     pub const fn endpoint(&self) -> &Endpoint {
         &self.endpoint
     }
 
     /// Returns whether the adapter has returned what it sends.
-    #[must_use]
     pub const fn has_echo(&self) -> bool {
         matches!(self.echo, Some(true))
     }

@@ -131,14 +131,12 @@ impl Device {
     }
 
     /// Returns whether a change of the unit's line settings also concerns this computer's port.
-    #[must_use]
     pub const fn is_serial(&self) -> bool {
         self.master.endpoint().place.is_serial()
     }
 
     /// Returns the failure for an exception, with its meaning. An exception from a gateway means that the unit does not
     /// answer.
-    #[must_use]
     pub fn exception(&self, code: u8, about: &str) -> Failure {
         let unit = self.unit;
         if is_from_gateway(code) {
@@ -166,7 +164,6 @@ impl Device {
     }
 
     /// Returns the failure for a request without an answer.
-    #[must_use]
     pub fn lost(&self, lost: &Lost) -> Failure {
         let endpoint = self.master.endpoint();
         let unit = self.unit;
@@ -202,7 +199,6 @@ impl Device {
 }
 
 /// Describes an endpoint for people.
-#[must_use]
 pub fn place(endpoint: &Endpoint) -> String {
     match &endpoint.place {
         Place::Serial(path) => format!("{path}, {} bit/s {}", endpoint.baud, endpoint.format),

@@ -197,7 +197,6 @@ fn shown(endpoint: &Endpoint) -> String {
 }
 
 /// Returns the description with these modules in its slots, to which the settings by point belong.
-#[must_use]
 pub fn with_modules(
     mut description: Description,
     module: impl Fn(u8) -> Option<u16>,

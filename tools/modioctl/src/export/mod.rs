@@ -185,7 +185,6 @@ fn power(exponent: i8) -> f64 {
 }
 
 /// Returns whether a name may contain a character.
-#[must_use]
 pub const fn is_plain(c: char) -> bool {
     c.is_ascii_alphanumeric() || matches!(c, ' ' | '.' | '_' | '-')
 }

@@ -38,7 +38,6 @@ pub enum Step {
 impl Editor {
     /// Opens the slider at the present value, or at the lowest value when the present one is not known. Returns
     /// `None` when the point is not an analog output.
-    #[must_use]
     pub fn new(item: &Item, words: Option<&[u16]>) -> Option<Self> {
         let Meaning::Analog(reading) = &item.meaning else {
             return None;
@@ -87,7 +86,6 @@ impl Editor {
     }
 
     /// Returns the position of the slider, from 0 (left) to 1 (right).
-    #[must_use]
     pub fn part(&self) -> f64 {
         let span = f64::from(self.reading.max) - f64::from(self.reading.min);
         (f64::from(self.position) - f64::from(self.reading.min)) / span
@@ -110,13 +108,11 @@ impl Editor {
     }
 
     /// Returns the value of the slider, for people.
-    #[must_use]
     pub fn shown(&self) -> Shown {
         show(&self.item, &[self.position as u16], false)
     }
 
     /// Returns the lowest and the highest value, for people.
-    #[must_use]
     pub fn ends(&self) -> [Shown; 2] {
         [self.reading.min, self.reading.max].map(|end| show(&self.item, &[end as u16], false))
     }

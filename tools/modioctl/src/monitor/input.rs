@@ -90,7 +90,6 @@ fn key(model: &mut Model, key: KeyEvent, screen: Rect, now: Instant) -> Action {
 }
 
 /// Returns the part that receives movement keys. The page of the line contains only its log.
-#[must_use]
 pub fn focus(model: &Model) -> Focus {
     match model.page {
         Page::Points => model.focus,

@@ -36,7 +36,6 @@ pub struct Parts {
 
 impl Parts {
     /// Divides the screen.
-    #[must_use]
     pub fn new(screen: Rect, page: Page) -> Self {
         let [head, tabs, main, message, keys] = Layout::vertical([
             Constraint::Length(1),
@@ -97,7 +96,6 @@ impl Parts {
     }
 
     /// Returns the rows below the title of a part.
-    #[must_use]
     pub const fn inside(part: Rect) -> Rect {
         Rect {
             y: part.y.saturating_add(1),
@@ -107,7 +105,6 @@ impl Parts {
     }
 
     /// Returns the positions of the page names.
-    #[must_use]
     pub fn pages(&self) -> [(Page, &'static str, Rect); 2] {
         let at = |x: u16, width| {
             let cell = Rect {
@@ -124,7 +121,6 @@ impl Parts {
     }
 
     /// Returns the area of the values in the tree. A click there operates an output.
-    #[must_use]
     pub fn values(&self) -> Rect {
         let inside = Self::inside(self.tree);
         Rect {
@@ -136,7 +132,6 @@ impl Parts {
     }
 
     /// Returns the buttons of a failed write: to repeat it, and to drop it.
-    #[must_use]
     pub fn buttons(&self) -> [Rect; 2] {
         let line = Rect {
             y: self.message.y.saturating_add(1),
@@ -184,7 +179,6 @@ pub const LEAVE: &str = "[Esc: leave]";
 
 impl Slider {
     /// Places the slider in the middle of the screen.
-    #[must_use]
     pub fn new(screen: Rect) -> Self {
         let window = centred(screen, 58, 9);
         let line = |y: u16, x: u16, width: usize| {
@@ -207,7 +201,6 @@ impl Slider {
 }
 
 /// Returns a window in the middle of the screen.
-#[must_use]
 pub fn centred(screen: Rect, width: u16, height: u16) -> Rect {
     let (width, height) = (width.min(screen.width), height.min(screen.height));
     Rect {

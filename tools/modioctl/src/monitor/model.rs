@@ -109,7 +109,6 @@ pub struct Model {
 
 impl Model {
     /// Returns a display of a unit before the first message of the polling task.
-    #[must_use]
     pub fn new(place: String, unit: u8, every: Duration, now: Instant) -> Self {
         Self {
             place,
@@ -255,14 +254,12 @@ impl Model {
     }
 
     /// Returns the message to show, if it is not too old.
-    #[must_use]
     pub fn notice(&self, now: Instant) -> Option<&str> {
         let (text, at) = self.notice.as_ref()?;
         (now.saturating_duration_since(*at) < NOTICE).then_some(text.as_str())
     }
 
     /// Returns the conditions that the unit reports; `None` when there are none, or when they are not known.
-    #[must_use]
     pub fn status(&self, now: Instant) -> Option<String> {
         let (value, _) = self.value("status", now).filter(|(_, fresh)| *fresh)?;
         let item = self.book.item("status")?;
@@ -271,39 +268,33 @@ impl Model {
     }
 
     /// Returns the words of an item, and whether they are fresh.
-    #[must_use]
     pub fn value(&self, name: &str, now: Instant) -> Option<(&Stamped, bool)> {
         let value = self.values.get(name)?;
         Some((value, self.link.is_fresh(value.at, now, Duration::ZERO)))
     }
 
     /// Returns the words of a counter, and whether they are fresh.
-    #[must_use]
     pub fn counter(&self, name: &str, now: Instant) -> Option<(&Stamped, bool)> {
         let value = self.values.get(name)?;
         Some((value, self.link.is_fresh(value.at, now, SELDOM)))
     }
 
     /// Returns the history of a point.
-    #[must_use]
     pub fn history(&self, name: &str) -> Option<&History> {
         self.histories.get(name)
     }
 
     /// Returns the reason why the unit refuses the points of a port.
-    #[must_use]
     pub fn refusal(&self, port: u8) -> Option<&str> {
         self.refused.get(&port).map(String::as_str)
     }
 
     /// Returns whether a port waits for a restart, so that its analog values have no known meaning.
-    #[must_use]
     pub fn waits(&self, port: u8) -> bool {
         self.waiting.contains(&port)
     }
 
     /// Returns the point that is selected.
-    #[must_use]
     pub fn point(&self) -> Option<&Item> {
         match self.tree.selected()? {
             Row::Point(item) => Some(item),

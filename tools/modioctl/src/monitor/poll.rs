@@ -59,7 +59,6 @@ enum Round {
 
 impl Poller {
     /// Creates the task for an open device without knowledge about the unit.
-    #[must_use]
     pub fn new(
         device: Device,
         every: Duration,

@@ -65,7 +65,6 @@ impl Screen {
     }
 
     /// Returns whether a part of the program has panicked, so that nothing may be drawn any more.
-    #[must_use]
     pub fn has_panicked(&self) -> bool {
         self.panicked.load(Ordering::Relaxed)
     }

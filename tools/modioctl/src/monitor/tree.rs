@@ -15,7 +15,6 @@ pub enum Row<'a> {
 
 impl Row<'_> {
     /// Returns the name that distinguishes the row: `p5`, `p5.1`.
-    #[must_use]
     pub fn name(&self) -> String {
         match self {
             Row::Port(port) => format!("p{}", port.number),
@@ -45,13 +44,11 @@ impl Tree {
     }
 
     /// Returns the ports.
-    #[must_use]
     pub fn ports(&self) -> &[PortItems] {
         &self.ports
     }
 
     /// Returns the rows, without the points of ports that are closed.
-    #[must_use]
     pub fn rows(&self) -> Vec<Row<'_>> {
         let rows = self.ports.iter().flat_map(|port| {
             let open = self.is_open(port.number);
@@ -62,7 +59,6 @@ impl Tree {
     }
 
     /// Returns whether the points of a port are shown.
-    #[must_use]
     pub fn is_open(&self, port: u8) -> bool {
         !self.closed.contains(&port)
     }
@@ -77,13 +73,11 @@ impl Tree {
     }
 
     /// Returns the row that is selected.
-    #[must_use]
     pub fn selected(&self) -> Option<Row<'_>> {
         self.rows().get(self.selected).copied()
     }
 
     /// Returns the index of the selected row.
-    #[must_use]
     pub const fn index(&self) -> usize {
         self.selected
     }
@@ -119,7 +113,6 @@ impl Tree {
     }
 
     /// Returns the index of the first row in the window, as it was drawn.
-    #[must_use]
     pub const fn offset(&self) -> usize {
         self.offset
     }

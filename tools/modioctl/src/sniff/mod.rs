@@ -57,7 +57,6 @@ pub struct Request {
 
 impl Piece {
     /// Returns the time from the end of the request to the beginning of its response.
-    #[must_use]
     pub fn turnaround(&self) -> Option<Duration> {
         match &self.kind {
             Kind::Frame {
