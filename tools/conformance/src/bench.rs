@@ -9,7 +9,7 @@ use crate::frame::{Reply, hex};
 use crate::target::Target;
 
 /// Waiting times.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Patience {
     /// Time to wait for the first character of a reply that is due.
     pub reply: Duration,
@@ -31,10 +31,8 @@ pub struct Bench<'a> {
     pub endpoint: &'a mut dyn Endpoint,
     /// The unit.
     pub target: &'a Target,
-    /// How long to wait.
+    /// How long to wait; a case may change it.
     pub patience: Patience,
-    /// Whether a modio's configuration may be written.
-    pub allow_config: bool,
     /// Number of due replies that were missing, so that the request was repeated.
     pub asked_again: u32,
     /// The last request and the reply, for people.
@@ -48,17 +46,11 @@ pub struct Bench<'a> {
 
 impl<'a> Bench<'a> {
     /// Returns the tools for this line and unit.
-    pub fn new(
-        endpoint: &'a mut dyn Endpoint,
-        target: &'a Target,
-        patience: Patience,
-        allow_config: bool,
-    ) -> Self {
+    pub fn new(endpoint: &'a mut dyn Endpoint, target: &'a Target) -> Self {
         Self {
             endpoint,
             target,
-            patience,
-            allow_config,
+            patience: target.patience,
             asked_again: 0,
             sent: String::new(),
             came: String::new(),

@@ -6,6 +6,7 @@ use std::fmt;
 use register_map::points::{self, Kind};
 use register_map::{Board, Module};
 
+use crate::bench::Patience;
 use crate::frame::Mode;
 
 /// A run of addresses that one request can ask for.
@@ -146,6 +147,10 @@ pub struct Target {
     pub unit: u8,
     /// RTU or ASCII.
     pub mode: Mode,
+    /// How long to wait.
+    pub patience: Patience,
+    /// Whether a modio's configuration may be written.
+    pub allow_config: bool,
     /// The functions that were probed.
     pub functions: BTreeMap<u8, Support>,
     /// The readable addresses, for functions 1 to 4. The runs are in ascending order. Two runs follow each other
@@ -214,6 +219,8 @@ mod tests {
         Target {
             unit: 1,
             mode: Mode::Rtu,
+            patience: Patience::default(),
+            allow_config: false,
             functions: BTreeMap::from([(3, Support::Yes), (4, Support::Refused)]),
             readable: [vec![], vec![], holding, vec![]],
             bits: None,

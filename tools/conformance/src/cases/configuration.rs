@@ -91,7 +91,7 @@ fn command(bench: &mut Bench<'_>) -> Check {
     for value in [0, 7, 0xB006, 0xFFFF] {
         bench.exception(&pdu(6, configuration::COMMAND, value), 3)?;
     }
-    if bench.allow_config {
+    if bench.target.allow_config {
         bench.unlock()?;
         let clear_flag = Command::ClearWatchdogFlag.code();
         let request = pdu(6, configuration::COMMAND, clear_flag);

@@ -123,7 +123,7 @@ fn quantity_out_of_range(bench: &mut Bench<'_>) -> Check {
 
 /// Returns the 123 registers that a case may write to, if the unit has that many. The case must restore their values.
 pub(super) fn wide(bench: &mut Bench<'_>) -> Check<Option<Span>> {
-    let config = bench.target.modio.is_some() && bench.allow_config && bench.target.has(3);
+    let config = bench.target.modio.is_some() && bench.target.allow_config && bench.target.has(3);
     if config {
         bench.unlock()?;
         return Ok(Some(Span {

@@ -19,7 +19,7 @@ use conformance::endpoint::sim::{Fitting, start};
 use conformance::frame::Mode;
 use conformance::probe::{Given, probe};
 use conformance::report::table;
-use conformance::run::{Options, Outcome, Verdict, run};
+use conformance::run::{Outcome, Verdict, run};
 use modbus_line::LineFormat;
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 use register_map::board::{MODIO_02, MODIO_08};
@@ -66,12 +66,8 @@ fn outcomes(endpoint: &mut dyn Endpoint, dip: u8, mode: Mode, cases: &[Case]) ->
         profile: None,
         allow_config: true,
     };
-    let (target, patience) = probe(endpoint, &given).expect("the unit answers");
-    let options = Options {
-        patience,
-        allow_config: true,
-    };
-    run(endpoint, &target, options, cases, |_| {}).expect("the endpoint works")
+    let target = probe(endpoint, &given).expect("the unit answers");
+    run(endpoint, &target, cases).expect("the endpoint works")
 }
 
 /// Runs these cases in process.
