@@ -155,10 +155,7 @@ fn ping(target: &Target) -> Option<Vec<u8>> {
 /// Reads from a modio's registers what the modio has, and how much longer than t3.5 its reply may take.
 fn modio(bench: &mut Bench<'_>) -> Check<Target> {
     let board = Board::from_code(bench.read_word(state::BOARD)?);
-    let codes = bench.read_words(Span {
-        first: state::MODULE_IN_FORCE,
-        last: state::MODULE_IN_FORCE + points::PORTS - 1,
-    })?;
+    let codes = bench.read_words(Span::of(state::MODULE_IN_FORCE, points::PORTS))?;
     let mut modules = [Module::None; points::PORTS as usize];
     for (module, code) in modules.iter_mut().zip(codes) {
         *module = Module::from_code(code).unwrap_or(Module::None);
@@ -180,16 +177,10 @@ fn modio(bench: &mut Bench<'_>) -> Check<Target> {
     for block in BLOCKS.into_iter().skip(1) {
         let mut open: Option<Span> = None;
         for (rule, _) in block.registers() {
-            let last = rule.first + (rule.count - 1);
+            let here = Span::of(rule.first, rule.count);
             match &mut open {
-                Some(span) if span.last + 1 == rule.first => span.last = last,
-                _ => {
-                    registers.extend(open);
-                    open = Some(Span {
-                        first: rule.first,
-                        last,
-                    });
-                }
+                Some(span) if span.last + 1 == here.first => span.last = here.last,
+                _ => registers.extend(open.replace(here)),
             }
         }
         registers.extend(open);
@@ -200,10 +191,7 @@ fn modio(bench: &mut Bench<'_>) -> Check<Target> {
         Some(span) => Some(outputs(bench, *span)?),
         // A setting that touches no output: the NTC constants.
         None if target.allow_config => Some(Words {
-            span: Span {
-                first: configuration::BETA,
-                last: configuration::BETA + points::COUNT - 1,
-            },
+            span: Span::of(configuration::BETA, points::COUNT),
             low: 2001,
             high: 5000,
             refused: Some(5001),

@@ -21,9 +21,14 @@ pub struct Span {
 impl Span {
     /// Returns a span of one address.
     pub const fn one(address: u16) -> Self {
+        Self::of(address, 1)
+    }
+
+    /// Returns a span of `count` addresses, at least one.
+    pub const fn of(first: u16, count: u16) -> Self {
         Self {
-            first: address,
-            last: address,
+            first,
+            last: first + (count - 1),
         }
     }
 

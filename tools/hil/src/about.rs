@@ -138,12 +138,7 @@ impl fmt::Display for Adapter {
 impl Unit {
     /// Reads the registers of the unit, a modio with these modules.
     pub fn ask(bench: &mut Bench<'_>, modules: Modio) -> Check<Self> {
-        let mut read = |first, count: u16| {
-            bench.read_words(Span {
-                first,
-                last: first + (count - 1),
-            })
-        };
+        let mut read = |first, count| bench.read_words(Span::of(first, count));
         let version = read(state::FIRMWARE_VERSION, 3)?;
         let [firmware, patch, map] = version[..] else {
             unreachable!("three registers were read");

@@ -162,24 +162,8 @@ mod tests {
 
     #[test]
     fn command_line_takes_precedence_over_the_bench_file() {
-        let arguments = [
-            "--port",
-            "/dev/b",
-            "--flash",
-            "--probe",
-            "3:4",
-            "--unit",
-            "9",
-            "--baud",
-            "9600",
-            "--format",
-            "8N1",
-            "--module",
-            "4di",
-            "--reset-cmd",
-            "s",
-        ];
-        let merged = setup(FILE, &arguments).unwrap();
+        let arguments = "--port /dev/b --flash --probe 3:4 --unit 9 --baud 9600 --format 8N1 --module 4di --reset-cmd s";
+        let merged = setup(FILE, &arguments.split(' ').collect::<Vec<_>>()).unwrap();
         assert_eq!(merged.port(), Some(Path::new("/dev/b")));
         assert_eq!(merged.line().to_string(), "9600 8N1");
         assert_eq!(merged.flash().unwrap().probe.as_deref(), Some("3:4"));

@@ -63,15 +63,7 @@ fn complaint(output: &Output) -> String {
 fn image_is_written_then_the_board_is_reset_then_tested() {
     let fake = Fake::new("");
     let reset = fake.note("reset");
-    let arguments = [
-        "--flash",
-        "--probe",
-        "1:2",
-        "--elf",
-        "x",
-        "--reset-cmd",
-        &reset,
-    ];
+    let arguments = ["--flash", "--probe=1:2", "--elf=x", "--reset-cmd", &reset];
     let output = fake.run(&arguments);
     assert_eq!(fake.log(), ["xtask flash --probe 1:2 --elf x", "reset"]);
     let error = complaint(&output);

@@ -152,10 +152,7 @@ fn self_description(bench: &mut Bench<'_>) -> Check {
         crc.to_be_bytes() == head[2..],
         "the CRC in the second record",
     )?;
-    let in_force = bench.read_words(Span {
-        first: state::MODULE_IN_FORCE,
-        last: state::MODULE_IN_FORCE + points::PORTS - 1,
-    })?;
+    let in_force = bench.read_words(Span::of(state::MODULE_IN_FORCE, points::PORTS))?;
     let described = (1..).zip(in_force).all(|(number, code)| {
         let port = unit.ports.iter().find(|port| port.number == number);
         port.map_or(0, |port| port.module) == code

@@ -171,10 +171,7 @@ fn quantities_most(bench: &mut Bench<'_>) -> Check {
     let run = bench.target.longest(3).filter(|run| run.len() >= 125);
     let (Some(wide), Some(run)) = (wide.filter(|_| bench.target.has(3)), run) else {
         let nowhere = bench.nowhere(3)?;
-        let read = Span {
-            first: nowhere.saturating_sub(124),
-            last: nowhere.saturating_sub(124) + 124,
-        };
+        let read = Span::of(nowhere.saturating_sub(124), 125);
         return bench.exception(&both(read, read.first, &[0; 121]), 2);
     };
     // Write the values that the registers already have.

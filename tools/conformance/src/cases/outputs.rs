@@ -65,19 +65,11 @@ fn inputs(bench: &mut Bench<'_>) -> Check {
 }
 
 fn read(bench: &mut Bench<'_>, function: u8, address: u16) -> Check<u16> {
-    if function == 3 {
-        return bench.read_word(address);
-    }
-    let one = Span::one(address);
-    Ok(u16::from(bench.read_bits(one)?[0]))
+    Ok(read_all(bench, function, Span::one(address))?[0])
 }
 
 fn write(bench: &mut Bench<'_>, function: u8, address: u16, value: u16) -> Check {
-    if function == 3 {
-        bench.set_words(address, &[value])
-    } else {
-        bench.set_bits(address, &[value != 0])
-    }
+    write_all(bench, function, address, &[value])
 }
 
 fn set(bench: &mut Bench<'_>, register: u16, value: u16) -> Check {

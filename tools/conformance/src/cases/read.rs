@@ -18,67 +18,32 @@ fn data_bytes(function: u8, quantity: u16) -> usize {
     }
 }
 
+#[rustfmt::skip]
 macro_rules! reading {
-    ($f:literal, $name:literal, $section:literal) => {
-        [
-            case(
-                concat!($name, "/quantity-0"),
-                $section,
-                "a quantity of 0 is exception 03",
-                &[Need::Function($f)],
-                quantity_0::<$f>,
-            ),
-            case(
-                concat!($name, "/quantity-above-most"),
-                $section,
-                "a quantity above 2000 bits or 125 words is exception 03, up to FFFF",
-                &[Need::Function($f)],
-                quantity_above::<$f>,
-            ),
-            case(
-                concat!($name, "/quantity-most"),
-                $section,
-                "2000 bits or 125 words are in range: 250 data bytes, or 02 where there are not so many",
-                &[Need::Function($f)],
-                quantity_most::<$f>,
-            ),
-            case(
-                concat!($name, "/byte-count"),
-                $section,
-                "every quantity gives its number of bytes, the bits beyond it zero",
-                &[Need::Function($f), Need::Readable($f)],
-                byte_count::<$f>,
-            ),
-            case(
-                concat!($name, "/one-past-the-end"),
-                $section,
-                "a range that reaches one address past the end of a run is exception 02",
-                &[Need::Function($f), Need::Readable($f)],
-                one_past::<$f>,
-            ),
-            case(
-                concat!($name, "/no-wrap"),
-                $section,
-                "address FFFF with quantity 2 is exception 02: addresses do not wrap",
-                &[Need::Function($f)],
-                no_wrap::<$f>,
-            ),
-            case(
-                concat!($name, "/quantity-before-address"),
-                $section,
-                "a bad quantity at a bad address is exception 03, not 02",
-                &[Need::Function($f)],
-                quantity_first::<$f>,
-            ),
-            case(
-                concat!($name, "/length"),
-                $section,
-                "a request a byte short or long under a good check is 03 or silence, never data",
-                &[Need::Function($f), Need::Readable($f)],
-                length::<$f>,
-            ).interpretation(),
-        ]
-    };
+    ($f:literal, $name:literal, $section:literal) => { [
+        case(concat!($name, "/quantity-0"), $section, "a quantity of 0 is exception 03", &[Need::Function($f)],
+            quantity_0::<$f>),
+        case(concat!($name, "/quantity-above-most"), $section,
+            "a quantity above 2000 bits or 125 words is exception 03, up to FFFF", &[Need::Function($f)],
+            quantity_above::<$f>),
+        case(concat!($name, "/quantity-most"), $section,
+            "2000 bits or 125 words are in range: 250 data bytes, or 02 where there are not so many",
+            &[Need::Function($f)], quantity_most::<$f>),
+        case(concat!($name, "/byte-count"), $section,
+            "every quantity gives its number of bytes, the bits beyond it zero",
+            &[Need::Function($f), Need::Readable($f)], byte_count::<$f>),
+        case(concat!($name, "/one-past-the-end"), $section,
+            "a range that reaches one address past the end of a run is exception 02",
+            &[Need::Function($f), Need::Readable($f)], one_past::<$f>),
+        case(concat!($name, "/no-wrap"), $section,
+            "address FFFF with quantity 2 is exception 02: addresses do not wrap", &[Need::Function($f)],
+            no_wrap::<$f>),
+        case(concat!($name, "/quantity-before-address"), $section,
+            "a bad quantity at a bad address is exception 03, not 02", &[Need::Function($f)], quantity_first::<$f>),
+        case(concat!($name, "/length"), $section,
+            "a request a byte short or long under a good check is 03 or silence, never data",
+            &[Need::Function($f), Need::Readable($f)], length::<$f>).interpretation(),
+    ] };
 }
 
 pub(super) const FC01: &[Case] = &reading!(1, "fc01", "V1.1b3 6.1");

@@ -126,10 +126,7 @@ pub(super) fn wide(bench: &mut Bench<'_>) -> Check<Option<Span>> {
     let config = bench.target.modio.is_some() && bench.target.allow_config && bench.target.has(3);
     if config {
         bench.unlock()?;
-        return Ok(Some(Span {
-            first: register_map::configuration::BETA,
-            last: register_map::configuration::BETA + 122,
-        }));
+        return Ok(Some(Span::of(register_map::configuration::BETA, 123)));
     }
     let known = bench.target.words.map(|words| words.span);
     Ok(known.filter(|span| span.len() >= 123))
@@ -185,10 +182,7 @@ fn quantity_most(bench: &mut Bench<'_>) -> Check {
 }
 
 fn unchanged(bench: &mut Bench<'_>, at: u16, value: u16, count: usize) -> Check {
-    let span = Span {
-        first: at,
-        last: at + count as u16 - 1,
-    };
+    let span = Span::of(at, count as u16);
     let now = bench.read_words(span)?;
     bench.ensure(
         now.iter().all(|word| *word == value),
