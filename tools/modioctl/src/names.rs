@@ -365,6 +365,17 @@ fn is_setting(register: &Register) -> bool {
         && !matches!(register.value, Value::Long(_))
 }
 
+/// Returns the names of a unit with this module in every slot, and with this RANGE and SCALE of every point.
+#[cfg(test)]
+pub fn book(
+    board: &register_map::Board,
+    module: register_map::Module,
+    reading: (u16, u16),
+) -> Book {
+    let description = modio_description::describe(board, "0.1.0", |_| module);
+    Book::new(description, vec![reading; 32])
+}
+
 #[cfg(test)]
 mod tests {
     use modio_description::describe;
@@ -374,9 +385,7 @@ mod tests {
     use super::*;
 
     fn book(module: Module) -> Book {
-        let mut readings = vec![(0, 0); 32];
-        readings[0x10] = (1, 1);
-        Book::new(describe(&MODIO_02, "0.1.0", |_| module), readings)
+        super::book(&MODIO_02, module, (1, 1))
     }
 
     #[test]
@@ -396,15 +405,6 @@ mod tests {
         assert_eq!(address("0x0101"), Ok((0x101, 1)));
         assert_eq!(book.find("0x0101").unwrap().name, "BAUD");
         assert_eq!(book.find("4096").unwrap().meaning, Meaning::Unknown);
-    }
-
-    #[test]
-    fn a_register_at_the_last_address_is_found() {
-        let mut unit = describe(&MODIO_02, "0.1.0", |_| Module::None);
-        unit.registers[0].address = 0xFFFF;
-        let book = Book::new(unit, Vec::new());
-        assert_eq!(book.find("0xFFFF").unwrap().address, 0xFFFF);
-        assert_eq!(book.find("0x0000").unwrap().meaning, Meaning::Unknown);
     }
 
     #[test]
@@ -454,10 +454,7 @@ mod tests {
 
     #[test]
     fn a_board_with_more_slots_has_their_points() {
-        let book = Book::new(
-            describe(&MODIO_08, "0.1.0", |_| Module::Do4),
-            vec![(0, 0); 32],
-        );
+        let book = super::book(&MODIO_08, Module::Do4, (0, 0));
         assert_eq!(book.points().count(), 16);
         assert_eq!(book.find("p4.4").unwrap().address, 15);
         assert!(book.find("p5.1").is_err());
@@ -474,5 +471,6 @@ mod tests {
         let book = Book::new(description, Vec::new());
         assert_eq!(book.find("0xFFFF").unwrap().name, "uptime");
         assert_eq!(book.find("0xFFFE").unwrap().meaning, Meaning::Unknown);
+        assert_eq!(book.find("0x0000").unwrap().meaning, Meaning::Unknown);
     }
 }

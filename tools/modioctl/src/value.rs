@@ -291,18 +291,14 @@ pub const fn table_name(table: Table) -> &'static str {
 
 #[cfg(test)]
 mod tests {
-    use modio_description::describe;
     use register_map::Module;
     use register_map::board::MODIO_02;
 
     use super::*;
-    use crate::names::Book;
+    use crate::names::{self, Book};
 
     fn book(range: u16, scale: u16) -> Book {
-        let mut readings = vec![(0, 0); 32];
-        readings[0x10] = (range, scale);
-        readings[0x12] = (range, scale);
-        Book::new(describe(&MODIO_02, "0.1.0", |_| Module::Ai2Ao2), readings)
+        names::book(&MODIO_02, Module::Ai2Ao2, (range, scale))
     }
 
     fn shown(name: &str, words: &[u16]) -> String {

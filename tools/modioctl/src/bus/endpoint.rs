@@ -56,6 +56,20 @@ pub struct Endpoint {
 }
 
 impl Endpoint {
+    /// Returns the endpoint at this place with the usual settings.
+    pub fn new(place: Place, framing: Framing) -> Self {
+        Self {
+            place,
+            baud: 9600,
+            format: Format::default(),
+            framing,
+            unit: 1,
+            timeout: Duration::from_secs(1),
+            retries: 2,
+            timeout_given: false,
+        }
+    }
+
     /// Returns rate and format of the line.
     pub const fn line(&self) -> LineFormat {
         LineFormat::new(self.baud, self.format)
@@ -230,21 +244,21 @@ impl Options {
             (_, Some(Mode::Ascii)) => Framing::Ascii,
             _ => Framing::Rtu,
         };
-        let format = merged.format.unwrap_or_default();
-        if framing == Framing::Rtu && format.data_bits == 7 && place.is_serial() {
+        let usual = Endpoint::new(place, framing);
+        let format = merged.format.unwrap_or(usual.format);
+        if framing == Framing::Rtu && format.data_bits == 7 && usual.place.is_serial() {
             return Err(Failure::usage(format!(
                 "--format {format}: RTU needs 8 data bits; 7 are for --mode ascii"
             )));
         }
         Ok(Endpoint {
-            place,
-            baud: merged.baud.unwrap_or(9600),
+            baud: merged.baud.unwrap_or(usual.baud),
             format,
-            framing,
-            unit: merged.unit.unwrap_or(1),
-            timeout: merged.timeout.unwrap_or(Duration::from_secs(1)),
-            retries: merged.retries.unwrap_or(2),
+            unit: merged.unit.unwrap_or(usual.unit),
+            timeout: merged.timeout.unwrap_or(usual.timeout),
+            retries: merged.retries.unwrap_or(usual.retries),
             timeout_given: merged.timeout.is_some(),
+            ..usual
         })
     }
 

@@ -361,7 +361,6 @@ const fn differs(pdu: &[u8]) -> bool {
 mod tests {
     use super::*;
     use crate::bus::Place;
-    use modbus_line::Format;
 
     /// As a simulator that is stopped: its pseudo-terminal is full at some time.
     #[tokio::test]
@@ -370,16 +369,8 @@ mod tests {
             .openpty(portable_pty::PtySize::default())
             .unwrap();
         let port = pair.master.tty_name().unwrap();
-        let endpoint = Endpoint {
-            place: Place::Serial(port.to_str().unwrap().to_owned()),
-            baud: 9600,
-            format: Format::default(),
-            framing: Framing::Rtu,
-            unit: 1,
-            timeout: Duration::from_millis(10),
-            retries: 0,
-            timeout_given: true,
-        };
+        let place = Place::Serial(port.to_str().unwrap().to_owned());
+        let endpoint = Endpoint::new(place, Framing::Rtu);
         let mut master = Master::open(endpoint, None).await.unwrap();
         let error = loop {
             if let Err(error) = master.put(1, &[0x41; 253]).await {

@@ -170,17 +170,15 @@ pub async fn identity(device: &mut Device) -> Result<Vec<(String, String)>, Unid
 
 #[cfg(test)]
 mod tests {
-    use modio_description::describe;
     use register_map::Module;
     use register_map::board::MODIO_08;
 
     use super::*;
-    use crate::names::Book;
+    use crate::names::book;
 
     #[test]
     fn every_register_has_a_group_and_reserved_ones_are_not_shown() {
-        let description = describe(&MODIO_08, "0.1.0", |_| Module::Ai4);
-        let book = Book::new(description, vec![(0, 0); 32]);
+        let book = book(&MODIO_08, Module::Ai4, (0, 0));
         let shown = |name: &str| {
             let item = book.find(name).unwrap();
             is_state(&item).then(|| group(item.address))

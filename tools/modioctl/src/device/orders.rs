@@ -140,10 +140,15 @@ impl Device {
     /// Prints a warning when a saved change waits for a restart that may be one of the line, and the connection is a
     /// gateway.
     pub async fn warn_of_restart(&mut self) -> Result<(), Failure> {
-        let status = self.read_words(state::STATUS, 1).await?;
-        let waits = status.iter().any(|word| word & status::RESTART_NEEDED != 0);
+        let waits = self.waits_for_restart().await?;
         self.warn_of_line(waits.then_some(BAUD));
         Ok(())
+    }
+
+    /// Returns whether a saved setting takes effect after the next restart.
+    pub async fn waits_for_restart(&mut self) -> Result<bool, Failure> {
+        let words = self.read_words(state::STATUS, 1).await?;
+        Ok(words.iter().any(|word| word & status::RESTART_NEEDED != 0))
     }
 
     async fn uptime(&mut self) -> Result<u32, Failure> {
@@ -216,20 +221,8 @@ mod tests {
 
     #[test]
     fn values_without_a_meaning_do_not_change_the_line() {
-        let serial = Endpoint {
-            place: Place::Serial("COM3".to_owned()),
-            baud: 9600,
-            format: modbus_line::Format::default(),
-            framing: Framing::Rtu,
-            unit: 1,
-            timeout: Duration::from_secs(1),
-            retries: 2,
-            timeout_given: false,
-        };
-        let tcp = Endpoint {
-            place: Place::Tcp("a:1".to_owned()),
-            ..serial.clone()
-        };
+        let serial = Endpoint::new(Place::Serial("COM3".to_owned()), Framing::Rtu);
+        let tcp = Endpoint::new(Place::Tcp("a:1".to_owned()), Framing::Rtu);
         let line = |now, words: [u16; 3]| announced(now, &words).map(|then| shown(&then));
         assert_eq!(line(&serial, [96, 0, 0]), None);
         assert_eq!(line(&serial, [0, 99, 99]), None);

@@ -8,12 +8,13 @@ use register_map::Module;
 use register_map::board::MODIO_08;
 use tokio::time::Instant;
 
-use super::fixture::{book, model, show};
+use super::fixture::{model, show};
 use super::input::{Action, event};
 use super::layout::{Parts, Slider};
 use super::messages::Update;
 use super::model::{Focus, Model, Page};
 use crate::failure::Failure;
+use crate::names::book;
 
 const SCREEN: Rect = Rect::new(0, 0, 80, 24);
 
@@ -220,7 +221,7 @@ fn pages_focus_and_log_follow_their_keys() {
 fn any_event_on_any_screen_is_handled() {
     let now = Instant::now();
     let mut model = outputs(Module::Ao4, now);
-    let eight = Box::new(book(&MODIO_08, Module::Do4, 0, 0));
+    let eight = Box::new(book(&MODIO_08, Module::Do4, (0, 0)));
     model.update(Update::Learned(eight), now);
     let codes = [
         KeyCode::Home,

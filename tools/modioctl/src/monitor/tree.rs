@@ -120,17 +120,15 @@ impl Tree {
 
 #[cfg(test)]
 mod tests {
-    use modio_description::describe;
     use register_map::Module;
     use register_map::board::MODIO_08;
 
     use super::*;
-    use crate::names::Book;
+    use crate::names::book;
 
     fn tree(module: Module) -> Tree {
         let mut tree = Tree::default();
-        let book = Book::new(describe(&MODIO_08, "0.1.0", |_| module), vec![(0, 0); 32]);
-        tree.set(book.ports());
+        tree.set(book(&MODIO_08, module, (0, 0)).ports());
         tree
     }
 
@@ -175,10 +173,9 @@ mod tests {
         let mut tree = tree(Module::Do4);
         tree.select(7);
         assert_eq!(selected(&tree), "p2.2");
-        let book = |module| Book::new(describe(&MODIO_08, "0.1.0", |_| module), vec![(0, 0); 32]);
-        tree.set(book(Module::Ai4).ports());
+        tree.set(book(&MODIO_08, Module::Ai4, (0, 0)).ports());
         assert_eq!(selected(&tree), "p2.2");
-        tree.set(book(Module::None).ports());
+        tree.set(book(&MODIO_08, Module::None, (0, 0)).ports());
         assert_eq!(selected(&tree), "p1");
         tree.set(Vec::new());
         assert_eq!(tree.selected(), None);

@@ -233,15 +233,15 @@ fn is_consistent(settings: &[Setting]) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use modio_description::describe;
     use register_map::Module;
     use register_map::board::MODIO_02;
 
     use super::*;
+    use crate::names::book;
 
     fn checked(text: &str) -> Result<Vec<String>, String> {
-        let unit = describe(&MODIO_02, "0.1.0", |_| Module::None);
-        let settings = check(&Book::new(unit, Vec::new()), "unit.toml", text);
+        let unit = book(&MODIO_02, Module::None, (0, 0));
+        let settings = check(&unit, "unit.toml", text);
         let shown = |(item, words): Setting| format!("{}={}", item.name, words[0]);
         settings
             .map(|settings| settings.into_iter().map(shown).collect())

@@ -7,7 +7,6 @@ use std::io::{IsTerminal, stdin};
 use std::path::Path;
 
 use register_map::codes::Command;
-use register_map::state::{self, status};
 use register_map::{configuration, points};
 
 use super::read;
@@ -322,7 +321,7 @@ async fn finish(mut device: Device, restart: bool) -> Result<(), Failure> {
     if !restart {
         return tell_restart(&mut device).await;
     }
-    if waits(&mut device).await? {
+    if device.waits_for_restart().await? {
         device.unlock().await?;
         device.restart().await?;
         output::line(format_args!("restarted: all settings are in force"))?;
@@ -330,13 +329,8 @@ async fn finish(mut device: Device, restart: bool) -> Result<(), Failure> {
     Ok(())
 }
 
-async fn waits(device: &mut Device) -> Result<bool, Failure> {
-    let words = device.read_words(state::STATUS, 1).await?;
-    Ok(words.iter().any(|word| word & status::RESTART_NEEDED != 0))
-}
-
 async fn tell_restart(device: &mut Device) -> Result<(), Failure> {
-    if waits(device).await? {
+    if device.waits_for_restart().await? {
         output::line(format_args!(
             "some settings take effect after a restart: use `modioctl reboot`"
         ))?;
