@@ -4,7 +4,6 @@
 //! differences.
 
 use std::path::Path;
-use std::time::Duration;
 
 use modio_description::{Description, Value, describe};
 use modioctl::bus::adu::Framing;
@@ -23,21 +22,8 @@ const FORMATS: [(ExportFormat, &str); 5] = [
     (ExportFormat::NodeRed, "node-red.json"),
 ];
 
-fn endpoint(place: Place, framing: Framing) -> Endpoint {
-    Endpoint {
-        place,
-        baud: 9600,
-        format: modbus_line::Format::default(),
-        framing,
-        unit: 1,
-        timeout: Duration::from_secs(1),
-        retries: 2,
-        timeout_given: false,
-    }
-}
-
 fn serial() -> Endpoint {
-    endpoint(Place::Serial("/dev/ttyUSB0".to_owned()), Framing::Rtu)
+    Endpoint::new(Place::Serial("/dev/ttyUSB0".to_owned()), Framing::Rtu)
 }
 
 /// A modio-02 with module 2ai2ao in engineering units: NTC, 4-20 mA, 0-10 V and 4-20 mA.
@@ -115,8 +101,8 @@ fn exports_equal_the_stored_files() {
 fn exports_read_back_for_every_board_and_endpoint() {
     let places = [
         serial(),
-        endpoint(Place::Tcp("gateway:4196".to_owned()), Framing::Rtu),
-        endpoint(Place::ModbusTcp("[::1]:502".to_owned()), Framing::Mbap),
+        Endpoint::new(Place::Tcp("gateway:4196".to_owned()), Framing::Rtu),
+        Endpoint::new(Place::ModbusTcp("[::1]:502".to_owned()), Framing::Mbap),
     ];
     for book in [analog(), digital()] {
         for endpoint in &places {
@@ -124,16 +110,14 @@ fn exports_read_back_for_every_board_and_endpoint() {
             let json: serde_json::Value =
                 serde_json::from_str(&export(ExportFormat::Json)).unwrap();
             assert_eq!(json["endpoint"]["unit"], 1);
-            let flow: Vec<serde_json::Value> =
-                serde_json::from_str(&export(ExportFormat::NodeRed)).unwrap();
+            let flow = nodes(&export(ExportFormat::NodeRed));
             let ids: std::collections::BTreeSet<_> =
                 flow.iter().map(|node| node["id"].to_string()).collect();
             assert_eq!(ids.len(), flow.len(), "the ids of nodes differ");
-            let telegraf: toml::Table = export(ExportFormat::Telegraf).parse().unwrap();
+            let telegraf = toml(&export(ExportFormat::Telegraf));
             let fields = &telegraf["inputs"]["modbus"][0]["metric"][0]["fields"];
             assert!(fields.as_array().unwrap().len() > book.points().count());
-            let yaml: serde_yaml_ng::Value =
-                serde_yaml_ng::from_str(&export(ExportFormat::HomeAssistant)).unwrap();
+            let yaml = yaml(&export(ExportFormat::HomeAssistant));
             assert!(yaml["modbus"][0]["sensors"].is_sequence());
             let rows = export(ExportFormat::Csv).lines().count();
             assert_eq!(rows, book.items().len() + 1);
@@ -143,8 +127,7 @@ fn exports_read_back_for_every_board_and_endpoint() {
 
 #[test]
 fn digital_points_are_switches_and_binary_sensors() {
-    let text = export(ExportFormat::HomeAssistant, &digital(), &serial()).unwrap();
-    let yaml: serde_yaml_ng::Value = serde_yaml_ng::from_str(&text).unwrap();
+    let yaml = yaml(&export_of(ExportFormat::HomeAssistant, &digital()));
     let count = |kind: &str| yaml["modbus"][0][kind].as_sequence().map_or(0, Vec::len);
     assert_eq!((count("binary_sensors"), count("switches")), (4, 12));
     assert!(yaml.get("template").is_none());
@@ -152,13 +135,13 @@ fn digital_points_are_switches_and_binary_sensors() {
 
 #[test]
 fn endpoint_that_a_system_cannot_use_is_rejected() {
-    let ascii = endpoint(Place::Tcp("gateway:4196".to_owned()), Framing::Ascii);
+    let ascii = Endpoint::new(Place::Tcp("gateway:4196".to_owned()), Framing::Ascii);
     for format in [ExportFormat::HomeAssistant, ExportFormat::NodeRed] {
         let error = export(format, &analog(), &ascii).unwrap_err();
         assert!(error.contains("ASCII"), "{error}");
     }
     assert!(export(ExportFormat::Telegraf, &analog(), &ascii).is_ok());
-    let no_port = endpoint(Place::ModbusTcp("gateway".to_owned()), Framing::Mbap);
+    let no_port = Endpoint::new(Place::ModbusTcp("gateway".to_owned()), Framing::Mbap);
     let error = export(ExportFormat::HomeAssistant, &analog(), &no_port).unwrap_err();
     assert!(error.contains("port"), "{error}");
     assert!(export(ExportFormat::Csv, &Book::default(), &serial()).is_err());
@@ -311,7 +294,7 @@ fn node_red_reads_each_port_with_its_own_request() {
 
 #[test]
 fn telegraf_reads_inputs_apart_only_where_connections_do_not_collide() {
-    let tcp = endpoint(Place::ModbusTcp("[::1]:502".to_owned()), Framing::Mbap);
+    let tcp = Endpoint::new(Place::ModbusTcp("[::1]:502".to_owned()), Framing::Mbap);
     let plugins = |book: &Book, endpoint: &Endpoint| -> Vec<Vec<String>> {
         let toml = toml(&export(ExportFormat::Telegraf, book, endpoint).unwrap());
         let names = |plugin: &toml::Value| {
@@ -354,7 +337,7 @@ fn telegraf_gets_the_device_name_of_ports_from_com10_on() {
         (r"\\.\COM10", r"\\.\COM10"),
         ("/dev/ttyS10", "file:///dev/ttyS10"),
     ] {
-        let endpoint = endpoint(Place::Serial(port.to_owned()), Framing::Rtu);
+        let endpoint = Endpoint::new(Place::Serial(port.to_owned()), Framing::Rtu);
         let toml = toml(&export(ExportFormat::Telegraf, &analog(), &endpoint).unwrap());
         let modbus = &toml["inputs"]["modbus"][0];
         assert_eq!(modbus["controller"].as_str(), Some(controller));
@@ -486,7 +469,7 @@ fn masters_leave_the_silence_of_the_rate_between_frames() {
     let pause = |millis: u64| Some(format!("\"{millis}ms\""));
     let at = |place: &str, baud| Endpoint {
         baud,
-        ..endpoint(Place::Tcp(place.to_owned()), Framing::Rtu)
+        ..Endpoint::new(Place::Tcp(place.to_owned()), Framing::Rtu)
     };
     assert_eq!(
         pauses(&at("gateway:4196", 9600)),
@@ -502,6 +485,6 @@ fn masters_leave_the_silence_of_the_rate_between_frames() {
         ..serial()
     };
     assert_eq!(pauses(&slow), (Some(34), Some(34), pause(34)));
-    let tcp = endpoint(Place::ModbusTcp("[::1]:502".to_owned()), Framing::Mbap);
+    let tcp = Endpoint::new(Place::ModbusTcp("[::1]:502".to_owned()), Framing::Mbap);
     assert_eq!(pauses(&tcp), (None, Some(1), None));
 }

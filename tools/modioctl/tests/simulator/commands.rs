@@ -244,7 +244,7 @@ fn each_of_three_boards_on_a_line_answers_for_itself() {
         Unit::with(2, &["--module", "4di"]),
         Unit::with(30, &["--module", "4ao"]),
     ];
-    let at = At::tcp(bus::of(&units.each_ref().map(|unit| unit.tcp), 0));
+    let at = At::tcp(bus::of(&units.each_ref().map(|unit| unit.tcp), |_| {}));
     let text = at.run("--timeout 600ms scan --units 1-3,29,30").fine();
     let lines: Vec<_> = text
         .lines()

@@ -1,15 +1,14 @@
 //! Tests of each exit status.
 
-use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener};
 use std::os::unix::fs::{PermissionsExt, chown};
 use std::path::PathBuf;
-use std::thread;
 
 use modioctl::bus::adu::Framing;
 
 use crate::ordinary::Ordinary;
 use crate::program::{At, Ran, modioctl};
+use crate::served::serve_requests;
 use crate::unit::Unit;
 
 #[test]
@@ -113,29 +112,14 @@ fn a_wrong_rate_is_status_3_or_4() {
 
 /// Two units with address 1: their answers collide on the line, where a 0 overrides a 1.
 fn two_units_with_one_address() -> SocketAddr {
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let address = listener.local_addr().unwrap();
-    thread::spawn(move || {
-        for mut master in listener.incoming().flatten() {
-            let mut bytes = [0; 512];
-            while let Ok(count @ 1..) = master.read(&mut bytes) {
-                let Some((1, pdu)) = Framing::Rtu.open(&bytes[..count]) else {
-                    continue;
-                };
-                // Their replies to function 11 are equal, because they are of one kind; all others differ.
-                let differs = pdu[0] != 0x11;
-                let answer = |unit: u8| [pdu[0], 2, 0x55, if differs { unit } else { 0xFF }];
-                let [one, other] = [1, 2].map(|unit| Framing::Rtu.frame(0, 1, &answer(unit)));
-                let both: Vec<_> = one
-                    .iter()
-                    .zip(other)
-                    .map(|(one, other)| one & other)
-                    .collect();
-                master.write_all(&both).unwrap();
-            }
-        }
-    });
-    address
+    serve_requests(|unit, pdu| {
+        // Their replies to function 11 are equal, because they are of one kind; all others differ.
+        let differs = pdu[0] != 0x11;
+        let answer = |unit: u8| [pdu[0], 2, 0x55, if differs { unit } else { 0xFF }];
+        let [one, other] = [1, 2].map(|unit| Framing::Rtu.frame(0, 1, &answer(unit)));
+        let both = one.iter().zip(other).map(|(one, other)| one & other);
+        Some(both.filter(|_| unit == 1).collect())
+    })
 }
 
 #[test]
