@@ -23,7 +23,6 @@ pub const CORNER: &str = "MODIO_CORNER";
 /// The packages of the image.
 const TARGET_PACKAGES: &str = "firmware board-support modio-drivers modbus-server register-map";
 
-/// The workspaces of this project.
 const WORKSPACES: [&str; 3] = ["Cargo.toml", fuzz::MANIFEST, peers::MANIFEST];
 
 /// The tests of the images that run at the corners: those whose result depends on the clocks, on the time of

@@ -11,7 +11,6 @@ use register_map::{Module, counters, points, state};
 use conformance::endpoint::{Abilities, Broken, Endpoint, Piece, Received};
 use conformance::frame::Mode;
 
-/// One unit.
 pub(super) struct Unit {
     pub address: u8,
     /// Rate and format in force.
@@ -113,7 +112,6 @@ pub(super) enum Fate {
 
 type Watch = Box<dyn FnMut(&[u8], &LineFormat) -> Fate>;
 
-/// The line.
 pub(super) struct Line {
     now: Duration,
     line: LineFormat,

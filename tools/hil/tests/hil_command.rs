@@ -11,7 +11,6 @@ use std::process::{Command, Output};
 /// A directory with a log of what was done, and a `cargo` that writes its arguments to the log.
 struct Fake {
     directory: tempfile::TempDir,
-    /// A line without a unit.
     line: TcpListener,
 }
 

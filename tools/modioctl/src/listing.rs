@@ -45,7 +45,6 @@ pub fn values(item: &Item) -> String {
     }
 }
 
-/// Returns an item for programs.
 fn item_json(item: &Item) -> Json {
     json!({
         "name": item.name,

@@ -271,7 +271,6 @@ fn kinds(description: &Description) -> impl Iterator<Item = (u16, u16, &PointKin
     })
 }
 
-/// Returns the address of a point.
 fn point(port: u16, channel: u16) -> u16 {
     (port.max(1) - 1) * CHANNELS + channel - 1
 }

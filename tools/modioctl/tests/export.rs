@@ -360,7 +360,6 @@ fn texts() -> impl Strategy<Value = String> {
     prop_oneof![known.prop_map(str::to_owned), ".{1,40}"]
 }
 
-/// Replaces every text of a description.
 fn with_texts(mut unit: Description, texts: &[String]) -> Description {
     let mut texts = texts.iter().cycle().cloned();
     let mut next = || texts.next().unwrap_or_default();

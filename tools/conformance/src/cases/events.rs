@@ -71,7 +71,6 @@ fn with_data(bench: &mut Bench<'_>, function: u8) -> Check {
     bench.exception_03_or_silence(&[function, 0, 0])
 }
 
-/// Reads the event count.
 fn events(bench: &mut Bench<'_>) -> Check<u16> {
     let reply = bench.reply(&[0x0B])?;
     let [0x0B, status_high, status_low, high, low] = reply[..] else {

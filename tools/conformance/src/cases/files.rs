@@ -36,7 +36,6 @@ pub(super) const CASES: &[Case] = &[
 /// A group of records: file, first record and number of records.
 type Group = (u16, u16, u16);
 
-/// Returns a group of a request, with this reference type.
 fn group(reference: u8, (file, record, count): Group) -> Vec<u8> {
     let fields = [file, record, count].map(u16::to_be_bytes);
     [&[reference], fields.as_flattened()].concat()

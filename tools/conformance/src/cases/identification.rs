@@ -24,7 +24,6 @@ pub(super) const CASES: &[Case] = &[
     case("fc2b/length", S, "a request cut short or too long is 03 or silence", N, length).interpretation(),
 ];
 
-/// One reply.
 struct Page {
     conformity: u8,
     /// The next object, if more follow.

@@ -161,7 +161,6 @@ fn line_lives(bench: &mut Bench<'_>) -> Check {
     result
 }
 
-/// Reads the outputs of one kind by `function`.
 fn read_all(bench: &mut Bench<'_>, function: u8, span: Span) -> Check<Vec<u16>> {
     if function == 3 {
         return bench.read_words(span);

@@ -9,7 +9,6 @@ const fn most(function: u8) -> u16 {
     if function <= 2 { 2000 } else { 125 }
 }
 
-/// Returns the number of data bytes of a reply.
 fn data_bytes(function: u8, quantity: u16) -> usize {
     if function <= 2 {
         usize::from(quantity).div_ceil(8)

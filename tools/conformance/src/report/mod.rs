@@ -65,7 +65,6 @@ fn asked_again(times: u32) -> String {
     }
 }
 
-/// Outcomes for the tests of the reports.
 #[cfg(test)]
 fn some_outcomes() -> Vec<Outcome> {
     use crate::case::Failure;

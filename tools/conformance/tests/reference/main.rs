@@ -150,7 +150,6 @@ fn every_fault_is_found_by_its_case() {
     assert!(missed.is_empty(), "not found: {missed:#?}");
 }
 
-/// Runs these cases on a modio with this fault.
 fn outcomes_of_modio(fault: Option<ModioFault>, cases: &[Case]) -> Vec<Outcome> {
     let mut endpoint = Reference::modio(fault, Mode::Rtu, LineFormat::default());
     let target = probed(&mut endpoint, Mode::Rtu, None);

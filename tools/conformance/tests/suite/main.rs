@@ -25,7 +25,6 @@ use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 use register_map::board::{MODIO_02, MODIO_08};
 use register_map::{Board, Module, configuration};
 
-/// The image of a board.
 fn elf(board: &Board) -> PathBuf {
     let name = if *board == MODIO_02 {
         "MODIO_ELF"
@@ -36,7 +35,6 @@ fn elf(board: &Board) -> PathBuf {
     PathBuf::from(elf.unwrap_or_else(|| panic!("{name}: cargo xtask test sets it")))
 }
 
-/// A modio-02 with this module and the factory settings.
 fn modio_02(module: Module) -> Fitting {
     Fitting {
         module,
@@ -52,7 +50,6 @@ fn modio_08(modules: [Module; 4]) -> Fitting {
     }
 }
 
-/// The rate and format of a line.
 fn line(baud: u32, format: &str) -> LineFormat {
     LineFormat::new(baud, format.parse().expect("a format"))
 }
@@ -70,7 +67,6 @@ fn outcomes(endpoint: &mut dyn Endpoint, dip: u8, mode: Mode, cases: &[Case]) ->
     run(endpoint, &target, cases).expect("the endpoint works")
 }
 
-/// Runs these cases in process.
 fn in_process(fitting: &Fitting, cases: &[Case]) -> Vec<Outcome> {
     let mut endpoint = start(fitting).expect("the image can be read");
     outcomes(&mut endpoint, fitting.dip, fitting.mode, cases)
@@ -84,7 +80,6 @@ fn failed(outcomes: &[Outcome]) -> Vec<String> {
     failed.map(table::row).collect()
 }
 
-/// Number of cases that passed.
 fn passed(outcomes: &[Outcome]) -> usize {
     let passed = outcomes.iter().filter(|o| o.verdict == Verdict::Passed);
     passed.count()

@@ -143,7 +143,6 @@ impl Master {
         Ok(())
     }
 
-    /// Asks one address.
     async fn offer(
         &mut self,
         unit: u8,

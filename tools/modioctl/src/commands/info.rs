@@ -30,7 +30,6 @@ const GROUPS: [&str; 7] = [
     "identity", "line", "modules", "state", "faults", "counters", "others",
 ];
 
-/// Returns the group of the register at this address.
 const fn group(address: u16) -> &'static str {
     match address {
         BAUD..=FRAME_GAP | state::UNIT_ADDRESS => "line",
@@ -118,7 +117,6 @@ pub enum Unidentified {
     Exception(u8),
     /// The answer contains no objects, or wrong lengths.
     Damaged,
-    /// There is no answer.
     Lost(Lost),
 }
 

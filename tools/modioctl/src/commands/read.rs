@@ -39,7 +39,6 @@ pub async fn print(
     output::table(&rows)
 }
 
-/// Returns an item with its value, for programs.
 fn as_json(item: &Item, words: &[u16], raw: bool) -> Json {
     let shown = show(item, words, raw);
     json!({

@@ -18,7 +18,6 @@ use crate::output;
 /// Shortest time that is worth an announcement.
 const LONG_SCAN: Duration = Duration::from_secs(10);
 
-/// A unit that was found.
 struct Unit {
     address: u8,
     line: Endpoint,
@@ -35,7 +34,6 @@ struct Scanned {
     never_silent: Vec<String>,
     /// Units that answered at the rate and format of `place` and have not been looked at.
     found: Found,
-    /// The present line.
     line: Option<Endpoint>,
     echo: bool,
 }

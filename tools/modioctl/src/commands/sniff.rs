@@ -148,7 +148,6 @@ fn milliseconds(time: Duration) -> f64 {
     (time.as_secs_f64() * 1e4).round() / 10.0
 }
 
-/// Returns a piece in words, for people.
 fn words(framing: Framing, piece: &Piece) -> String {
     match &piece.kind {
         Kind::Garbled => format!("garbled: {}", decode::count_of(&piece.bytes)),
@@ -187,7 +186,6 @@ fn line(framing: Framing, piece: &Piece, gap: Option<Duration>) -> String {
     format!("{seconds:9.3} {gap:>9} ms {text}{turnaround}")
 }
 
-/// Returns a piece as a JSON object.
 fn object(framing: Framing, piece: &Piece, time: DateTime<Local>, gap: Option<Duration>) -> Json {
     let (kind, unit, function) = match &piece.kind {
         Kind::Garbled => ("garbled", None, None),

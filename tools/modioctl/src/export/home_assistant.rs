@@ -182,7 +182,6 @@ pub fn text(line: Line<'_>) -> Result<String, Failure> {
     ))
 }
 
-/// A unit of a hub.
 #[derive(Clone, Copy)]
 struct Unit<'a> {
     name: &'a str,

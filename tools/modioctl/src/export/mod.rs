@@ -100,7 +100,6 @@ impl Line<'_> {
 }
 
 impl Source {
-    /// Returns the pulse counters of the inputs.
     fn counters(&self) -> impl Iterator<Item = &Item> {
         let is_input = |name: &str| {
             let mut points = self.book.points();

@@ -28,7 +28,6 @@ pub struct Entry {
 #[derive(Clone, Debug, Default)]
 pub struct Frames {
     entries: VecDeque<Entry>,
-    /// Number of frames that have been removed.
     removed: usize,
     /// Number of frames in front of the first one that is not shown; `None` when the newest frame is shown.
     end: Option<usize>,

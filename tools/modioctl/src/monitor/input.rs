@@ -20,9 +20,7 @@ const WHEEL: isize = 3;
 pub enum Action {
     /// Nothing.
     None,
-    /// End the program.
     Quit,
-    /// Write a value.
     Write(Write),
     /// Handle clicks of the mouse, or leave them to the terminal.
     Mouse(bool),

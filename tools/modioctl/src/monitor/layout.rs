@@ -6,7 +6,6 @@ use super::model::Page;
 
 /// Smallest width and height that the display fits in.
 pub const LEAST: (u16, u16) = (60, 16);
-/// Width of the tree.
 const TREE: u16 = 50;
 /// Smallest height of the chart when counters share its column.
 const CHART: u16 = 12;

@@ -24,7 +24,6 @@ pub struct Link {
 /// State of the connection.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum State {
-    /// The unit answers.
     Answers,
     /// Nothing is received.
     NoAnswer(Duration),

@@ -34,10 +34,8 @@ pub enum Page {
 /// Part of a page that receives movement keys.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Focus {
-    /// The tree.
     #[default]
     Tree,
-    /// The log.
     Frames,
 }
 

@@ -47,9 +47,7 @@ pub struct Poller {
     answered: Instant,
 }
 
-/// Result of a round.
 enum Round {
-    /// Its values are valid.
     Complete(Box<Polled>),
     /// A write is waiting, which may change values that were read before it.
     Interrupted,
@@ -269,7 +267,6 @@ impl Poller {
     }
 }
 
-/// Reads items into `words`.
 async fn read(device: &mut Device, items: &[Item], words: &mut Words) -> Result<(), Failure> {
     let values = device.read_items(items).await?;
     let names = items.iter().map(|item| item.name.clone());

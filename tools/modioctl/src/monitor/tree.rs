@@ -7,9 +7,7 @@ use crate::names::{Item, PortItems};
 /// A row of the tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Row<'a> {
-    /// A port.
     Port(&'a PortItems),
-    /// A point.
     Point(&'a Item),
 }
 

@@ -8,14 +8,11 @@ use super::{Kind, Piece, Request};
 use crate::bus::Direction;
 use crate::bus::adu::{ASCII_MOST, Framing, RTU_MOST};
 
-/// Content at the front of the buffer.
 #[derive(Debug, PartialEq, Eq)]
 enum Front {
-    /// A frame of this many bytes.
     Frame(usize),
     /// This many bytes that belong to no frame.
     Garbled(usize),
-    /// More bytes are needed.
     Unknown,
 }
 

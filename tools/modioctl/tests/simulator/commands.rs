@@ -5,7 +5,6 @@ use crate::program::{At, modioctl};
 use crate::unit::Unit;
 use crate::{bus, gateway};
 
-/// Returns a unit on each kind of line.
 fn lines(unit: &Unit) -> [At; 3] {
     [
         At::port(unit.pty.display()),

@@ -26,7 +26,6 @@ fn unit(silent_at: u16) -> (SocketAddr, Shared) {
     (address, server)
 }
 
-/// Returns a file with this text, and its folder.
 fn file(text: &str) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("unit.toml");

@@ -18,7 +18,6 @@ struct Unit {
     faults: Arc<Faults>,
 }
 
-/// Faults of the unit.
 #[derive(Default)]
 struct Faults {
     /// It answers no requests.

@@ -63,7 +63,6 @@ fn comment(item: &Item, unit: &str) -> String {
     }
 }
 
-/// A line of a file.
 #[derive(Debug, PartialEq, Eq)]
 struct Line {
     number: usize,
@@ -80,7 +79,6 @@ pub fn read(book: &Book, path: &Path) -> Result<Vec<Setting>, Failure> {
     check(book, &shown, &text)
 }
 
-/// Checks the text of the file with this name.
 fn check(book: &Book, file: &str, text: &str) -> Result<Vec<Setting>, Failure> {
     let (lines, mut wrong) = parsed(text);
     check_board(book.of_modio()?, file, &lines)?;

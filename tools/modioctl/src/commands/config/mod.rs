@@ -20,7 +20,6 @@ use crate::value::show;
 /// Largest number of registers that one request writes.
 const MOST: usize = 100;
 
-/// A setting with its words.
 type Setting = (Item, Vec<u16>);
 
 /// Text that Ctrl-C prints: how much of the command is done.
@@ -113,7 +112,6 @@ fn of_modules(book: &Book, module: impl Fn(u8) -> Option<u16>) -> Result<Book, F
     Ok(Book::new(description, Vec::new()))
 }
 
-/// Returns all settings with their values.
 async fn settings(device: &mut Device, book: &Book) -> Result<(Vec<Item>, Vec<Vec<u16>>), Failure> {
     let items: Vec<_> = book.settings().cloned().collect();
     let values = device.read_items(&items).await?;

@@ -15,7 +15,6 @@ use crate::monitor::model::Model;
 use crate::monitor::plan::Plan;
 use crate::value::show;
 
-/// Width of the name of a counter.
 const NAME: usize = 25;
 
 /// Draws the counters.

@@ -45,15 +45,11 @@ pub fn draw(frame: &mut Frame, model: &mut Model, now: Instant) {
     overlay::help(frame, model);
 }
 
-/// Colour of a good state.
 const GOOD: Style = Style::new().fg(Color::Green);
-/// Colour of faults.
 const BAD: Style = Style::new().fg(Color::Red).add_modifier(Modifier::BOLD);
 /// Style of values that are not fresh.
 const OLD: Style = Style::new().add_modifier(Modifier::DIM);
-/// Style of emphasised text.
 const STRONG: Style = Style::new().add_modifier(Modifier::BOLD);
-/// Style of selected text.
 const SELECTED: Style = Style::new().add_modifier(Modifier::REVERSED);
 
 /// Returns a part with a title. The title of the part that receives the keys is emphasised.
@@ -86,7 +82,6 @@ fn head(frame: &mut Frame, model: &Model, area: Rect, now: Instant) {
     frame.render_widget(right, area);
 }
 
-/// Returns the state of the connection, for people.
 fn state(model: &Model, now: Instant) -> (String, Style) {
     let since = |what: &str, duration| format!("× {what}no answer since {}", ago(duration));
     match model.link.state(now) {

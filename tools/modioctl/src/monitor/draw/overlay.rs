@@ -64,7 +64,6 @@ pub fn slider(frame: &mut Frame, model: &Model, now: Instant) {
     frame.render_widget(Span::styled(clip(keys, width), OLD), row(7));
 }
 
-/// The help.
 const HELP: [(&str, &str); 14] = [
     ("↑ ↓ PgUp PgDn", "select a row, or scroll the log"),
     ("← →", "close or open a port"),
