@@ -1,7 +1,7 @@
 //! Names of points and registers: `p5.1`, `p5.1.filter`, `p5.module`, `BAUD`, or an address.
 
 use modio_description::{
-    Description, ModuleType, PointKind, Reading, Register, Scope, Table, Value, Values,
+    Description, ModuleType, PointKind, Reading, Register, Scope, Table, Unit, Value, Values,
 };
 
 use crate::failure::Failure;
@@ -44,6 +44,15 @@ impl Item {
             Some(Values::Range(min, max)) => (*min..=*max).contains(&word),
             Some(Values::RangeOr(also, min, max)) => word == *also || (*min..=*max).contains(&word),
             Some(Values::OneOf(values)) => values.contains(&word),
+        }
+    }
+
+    /// Returns the unit of its number, without a name where it has none.
+    pub fn unit(&self) -> Unit {
+        match &self.meaning {
+            Meaning::Analog(reading) => reading.unit.clone(),
+            Meaning::Value(Value::Number(unit) | Value::Long(unit)) => unit.clone(),
+            _ => Unit::default(),
         }
     }
 }
@@ -158,16 +167,18 @@ impl Book {
         }
         if let Some(address) = number_of(name) {
             // The first item that contains the address, if it begins there.
-            let at = |item: &&Item| {
-                address
-                    .checked_sub(item.address)
-                    .is_some_and(|n| n < item.words)
-            };
-            let known = self.items.iter().find(at);
+            let before = |item: &Item| address.checked_sub(item.address);
+            let has = |item: &&Item| before(item).is_some_and(|n| n < item.words);
+            let known = self.items.iter().find(has);
             let known = known.filter(|item| item.address == address);
             return Ok(known.cloned().unwrap_or_else(|| unknown(address)));
         }
         Err(Failure::usage(self.no_such(name, &wanted)))
+    }
+
+    /// Returns the items with these names or addresses.
+    pub fn find_all(&self, names: &[String]) -> Result<Vec<Item>, Failure> {
+        names.iter().map(|name| self.find(name)).collect()
     }
 
     fn no_such(&self, name: &str, wanted: &str) -> String {
@@ -176,18 +187,9 @@ impl Book {
                 "{name}: the names of this unit are not known; give an address such as 0x0010"
             );
         }
-        let mut near: Vec<_> = self
-            .items
-            .iter()
-            .map(|item| {
-                (
-                    strsim::damerau_levenshtein(&slug(&item.name), wanted),
-                    &item.name,
-                )
-            })
-            .collect();
-        near.sort_by_key(|(distance, _)| *distance);
-        let near: Vec<_> = near.iter().take(4).map(|(_, name)| name.as_str()).collect();
+        let mut near: Vec<_> = self.items.iter().map(|item| item.name.as_str()).collect();
+        near.sort_by_cached_key(|name| strsim::damerau_levenshtein(&slug(name), wanted));
+        near.truncate(4);
         format!(
             "{name}: no such point or register; similar names: {}; `modioctl describe` lists all",
             near.join(", ")
@@ -289,19 +291,14 @@ fn points(description: &Description, readings: &[(u16, u16)]) -> Vec<Item> {
         items.push(Item {
             name: format!("p{port}.{channel}"),
             table,
-            address,
-            words: 1,
             meaning: match (table, reading) {
                 (Table::Bit, _) => Meaning::Bit,
                 (Table::Word, Some(reading)) => Meaning::Analog(reading.clone()),
                 (Table::Word, None) => Meaning::Unknown,
             },
             writable: kind.writable,
-            setting: false,
-            restart: false,
-            values: None,
-            default: 0,
             about: kind.name.clone(),
+            ..unknown(address)
         });
     }
     items

@@ -1,6 +1,6 @@
 //! Standard output and files. When the reader closes it, as `head` does, the program ends without an error message.
 
-use std::fmt::Arguments;
+use std::fmt::Display;
 use std::fs::File;
 use std::io::{self, ErrorKind, Write, stdout};
 use std::path::Path;
@@ -8,7 +8,7 @@ use std::path::Path;
 use crate::failure::Failure;
 
 /// Prints a line.
-pub fn line(text: Arguments<'_>) -> Result<(), Failure> {
+pub fn line(text: impl Display) -> Result<(), Failure> {
     let mut out = stdout().lock();
     match writeln!(out, "{text}").and_then(|()| out.flush()) {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => std::process::exit(0),
@@ -20,7 +20,7 @@ pub fn line(text: Arguments<'_>) -> Result<(), Failure> {
 /// Prints a value as JSON.
 pub fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
     let text = serde_json::to_string_pretty(value).map_err(Failure::usage)?;
-    line(format_args!("{text}"))
+    line(text)
 }
 
 /// Prints rows in columns.
@@ -33,7 +33,7 @@ pub fn table<const COLUMNS: usize>(rows: &[[String; COLUMNS]]) -> Result<(), Fai
     for column in table.column_iter_mut() {
         column.set_padding((0, 2));
     }
-    line(format_args!("{}", table.trim_fmt()))
+    line(table.trim_fmt())
 }
 
 /// Creates a file. Overwrites an existing one only with `force`. A device or a pipe is no existing file.
@@ -50,7 +50,7 @@ pub fn create(path: &Path, force: bool) -> Result<File, Failure> {
 /// Writes a text to a file, and reports that on standard error; or prints the text if no file is given.
 pub fn save(text: &str, path: Option<&Path>, force: bool) -> Result<(), Failure> {
     let Some(path) = path else {
-        return line(format_args!("{}", text.trim_end()));
+        return line(text.trim_end());
     };
     let written = create(path, force)?.write_all(text.as_bytes());
     written.map_err(|error| not_written(path, &error))?;

@@ -32,9 +32,8 @@ pub fn show(item: &Item, words: &[u16], raw: bool) -> Shown {
     match &item.meaning {
         Meaning::Bit if raw => number(first.into(), &Unit::default()),
         Meaning::Bit => Shown {
-            text: if first == 0 { "off" } else { "on" }.to_owned(),
-            unit: String::new(),
             json: json!(first != 0),
+            ..text(if first == 0 { "off" } else { "on" })
         },
         Meaning::Analog(reading) if !raw => number(signed(first, reading.min), &reading.unit),
         Meaning::Value(value) => register(value, words, raw),
@@ -65,36 +64,31 @@ fn register(value: &Value, words: &[u16], raw: bool) -> Shown {
         Value::Number(unit) => number(first.into(), if raw { &plain } else { unit }),
         Value::Long(unit) => number(long(words).into(), if raw { &plain } else { unit }),
         Value::Codes(names) if !raw => match names.iter().find(|(code, _)| *code == first) {
-            Some((_, name)) => text(name.clone()),
+            Some((_, name)) => text(name),
             None => number(first.into(), &plain),
         },
         Value::Bits(names) if !raw => {
-            let is_set = |bit: u8| {
-                first
-                    .checked_shr(bit.into())
-                    .is_some_and(|bits| bits & 1 == 1)
-            };
+            let is_set = |bit: u8| bit < 16 && first >> bit & 1 == 1;
             let set = names.iter().filter(|(bit, _)| is_set(*bit));
             let set: Vec<_> = set.map(|(_, name)| name.as_str()).collect();
+            let shown = set.join(", ");
             Shown {
-                text: if set.is_empty() {
-                    "-".to_owned()
-                } else {
-                    set.join(", ")
-                },
-                unit: String::new(),
                 json: json!(set),
+                ..text(if set.is_empty() { "-" } else { &shown })
             }
         }
         Value::Codes(_) | Value::Bits(_) => number(first.into(), &plain),
-        Value::Opaque => text(words.iter().map(|word| format!("{word:04X}")).collect()),
+        Value::Opaque => {
+            let digits: String = words.iter().map(|word| format!("{word:04X}")).collect();
+            text(&digits)
+        }
     }
 }
 
-fn text(text: String) -> Shown {
+fn text(text: &str) -> Shown {
     Shown {
         json: json!(text),
-        text,
+        text: text.to_owned(),
         unit: String::new(),
     }
 }
@@ -102,10 +96,10 @@ fn text(text: String) -> Shown {
 fn number(number: i64, unit: &Unit) -> Shown {
     let text = decimal(number + i64::from(unit.offset), unit.exponent);
     Shown {
-        json: text.parse::<i64>().map_or_else(
-            |_| json!(text.parse::<f64>().unwrap_or_default()),
-            |whole| json!(whole),
-        ),
+        json: match text.parse::<i64>() {
+            Ok(whole) => json!(whole),
+            Err(_) => json!(text.parse::<f64>().unwrap_or_default()),
+        },
         text,
         unit: unit_name(&unit.code).to_owned(),
     }
@@ -181,10 +175,8 @@ fn words(item: &Item, text: &str, raw: bool) -> Result<Vec<u16>, String> {
             let code = named.map(|(code, _)| *code).or(word);
             code.filter(|code| item.allows(*code)).ok_or_else(|| {
                 let takes = names.iter().filter(|(code, _)| item.allows(*code));
-                let takes: Vec<_> = takes
-                    .map(|(code, name)| format!("{code} = {name}"))
-                    .collect();
-                format!("it takes {}", takes.join(", "))
+                let takes = takes.map(|(code, name)| format!("{code} = {name}"));
+                format!("it takes {}", takes.collect::<Vec<_>>().join(", "))
             })?
         }
         Meaning::Value(Value::Number(unit)) => {
@@ -228,10 +220,8 @@ fn check_raw(item: &Item, word: u16) -> Result<(), String> {
 /// steps.
 fn steps(text: &str, unit: &Unit) -> Option<i64> {
     let shown = unit_name(&unit.code);
-    let number = text
-        .trim()
-        .strip_suffix(shown)
-        .or_else(|| text.trim().strip_suffix(&unit.code));
+    let text = text.trim();
+    let number = text.strip_suffix(shown).or(text.strip_suffix(&unit.code));
     let quantity: f64 = number.unwrap_or(text).trim().parse().ok()?;
     let steps = quantity / 10_f64.powi(unit.exponent.into());
     let whole = steps.round();
@@ -244,23 +234,18 @@ pub fn takes(values: &Values, unit: &Unit) -> String {
     match values {
         Values::Range(min, max) => range((*min).into(), (*max).into(), unit),
         // The value outside the range has a special meaning, unless it is 0.
-        Values::RangeOr(0, min, max) => {
-            format!("{}, or 0", range((*min).into(), (*max).into(), unit))
-        }
         Values::RangeOr(also, min, max) => {
-            format!(
-                "{}, or {also:#06X}",
-                range((*min).into(), (*max).into(), unit)
-            )
+            let range = range((*min).into(), (*max).into(), unit);
+            match also {
+                0 => format!("{range}, or 0"),
+                also => format!("{range}, or {also:#06X}"),
+            }
         }
         Values::OneOf(values) => {
-            let each = values
-                .iter()
-                .map(|value| number((*value).into(), unit).text);
-            let each: Vec<_> = each.collect();
-            format!("it takes {} {}", each.join(", "), unit_name(&unit.code))
-                .trim_end()
-                .to_owned()
+            let each = values.iter().map(|value| number((*value).into(), unit));
+            let each: Vec<_> = each.map(|shown| shown.text).collect();
+            let takes = format!("it takes {} {}", each.join(", "), unit_name(&unit.code));
+            takes.trim_end().to_owned()
         }
     }
 }

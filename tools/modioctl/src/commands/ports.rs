@@ -20,7 +20,7 @@ pub fn run(json: bool) -> Result<(), Failure> {
         return output::json(&each.collect::<Vec<_>>());
     }
     if ports.is_empty() {
-        return output::line(format_args!("no serial ports: is the adapter plugged in?"));
+        return output::line("no serial ports: is the adapter plugged in?");
     }
     let rows: Vec<_> = ports
         .iter()

@@ -12,11 +12,7 @@ use crate::value::show;
 /// Reads items by name or address.
 pub async fn run(device: &mut Device, options: &Read, json: bool) -> Result<(), Failure> {
     let book = fetch(device).await?.book;
-    let items: Vec<Item> = options
-        .names
-        .iter()
-        .map(|name| book.find(name))
-        .collect::<Result<_, _>>()?;
+    let items = book.find_all(&options.names)?;
     print(device, &items, options.raw, json).await
 }
 

@@ -53,7 +53,7 @@ pub async fn run(
         ));
     }
     let lines = lines(&endpoint, options);
-    if let Some(time) = announcement(&lines, options.units.0.len()) {
+    if let Some(time) = announcement(&lines, options.units.len()) {
         eprintln!("modioctl: {time}");
     }
     let mut scanned = Scanned::default();
@@ -62,7 +62,7 @@ pub async fn run(
         // Ctrl-C is handled before the scan begins.
         biased;
         _ = tokio::signal::ctrl_c() => false,
-        result = search(lines, observer, &options.units.0, &bar, &mut scanned) => {
+        result = search(lines, observer, &options.units, &bar, &mut scanned) => {
             result?;
             true
         }
@@ -93,10 +93,8 @@ pub async fn run(
 /// Returns the lines to try: each rate with each format. RTU needs 8 data bits, so formats with 7 are tried in ASCII
 /// mode.
 fn lines(endpoint: &Endpoint, options: &Scan) -> Vec<Endpoint> {
-    let rates = options.rates.as_ref();
-    let rates = rates.map_or(vec![endpoint.baud], |rates| rates.0.clone());
-    let formats = options.formats.as_ref();
-    let formats = formats.map_or(vec![endpoint.format], |formats| formats.0.clone());
+    let rates = options.rates.clone().unwrap_or(vec![endpoint.baud]);
+    let formats = options.formats.clone().unwrap_or(vec![endpoint.format]);
     let line = |baud, format: Format| Endpoint {
         baud,
         format,
@@ -377,7 +375,7 @@ mod tests {
             panic!("not a scan");
         };
         let endpoint = cli.endpoint.endpoint(None, None).unwrap();
-        (lines(&endpoint, &options), options.units.0.len())
+        (lines(&endpoint, &options), options.units.len())
     }
 
     #[test]

@@ -120,9 +120,9 @@ impl Printer {
             self.last = Some(piece.until);
             if self.json {
                 let time = self.wall + piece.from;
-                output::line(format_args!("{}", object(self.framing, piece, time, gap)))?;
+                output::line(object(self.framing, piece, time, gap))?;
             } else {
-                output::line(format_args!("{}", line(self.framing, piece, gap)))?;
+                output::line(line(self.framing, piece, gap))?;
             }
             if let Some((recorder, path)) = &mut self.record {
                 let since = self.wall.timestamp_nanos_opt().unwrap_or_default();

@@ -45,7 +45,7 @@ pub async fn run(device: &mut Device, options: &Write) -> Result<(), Failure> {
         ))?;
     }
     if unsaved {
-        output::line(format_args!("not saved: save with `modioctl config save`"))?;
+        output::line("not saved: save with `modioctl config save`")?;
     }
     Ok(())
 }

@@ -75,7 +75,7 @@ impl Device {
             } else {
                 format!("the unit now answers with {shown}: use that in your next command")
             };
-            output::line(format_args!("{text}"))?;
+            output::line(text)?;
         }
         Ok(self)
     }

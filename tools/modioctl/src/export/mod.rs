@@ -9,7 +9,7 @@ mod json;
 mod node_red;
 mod telegraf;
 
-use modio_description::{Table, Unit, Value};
+use modio_description::{Table, Unit};
 
 use crate::bus::adu::Framing;
 use crate::bus::{Endpoint, Place};
@@ -144,22 +144,14 @@ struct Scaling {
 
 impl Scaling {
     fn of(item: &Item) -> Self {
-        match &item.meaning {
-            Meaning::Analog(reading) => Self {
-                unit: reading.unit.clone(),
-                signed: reading.min < 0,
-                range: Some((reading.min, reading.max)),
-            },
-            Meaning::Value(Value::Number(unit) | Value::Long(unit)) => Self {
-                unit: unit.clone(),
-                signed: false,
-                range: None,
-            },
-            _ => Self {
-                unit: Unit::default(),
-                signed: false,
-                range: None,
-            },
+        let range = match &item.meaning {
+            Meaning::Analog(reading) => Some((reading.min, reading.max)),
+            _ => None,
+        };
+        Self {
+            unit: item.unit(),
+            signed: range.is_some_and(|(min, _)| min < 0),
+            range,
         }
     }
 

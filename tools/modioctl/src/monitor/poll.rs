@@ -7,6 +7,7 @@ use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender};
 use tokio::time::{Instant, sleep_until};
 
 use super::messages::{Polled, Update, Write};
+use super::model::SELDOM;
 use super::plan::{Plan, Words, is_analog};
 use crate::bus::{Endpoint, Observer};
 use crate::device::{Device, fetch};
@@ -22,8 +23,6 @@ const AGAIN: Duration = Duration::from_secs(1);
 /// Time without an answer after which a connection is opened again. A gateway that has lost its supply never closes
 /// it.
 const STUCK: Duration = Duration::from_secs(5);
-/// Interval at which counters are read.
-const COUNTERS: Duration = Duration::from_secs(1);
 /// Shortest pause between two rounds.
 const PAUSE: Duration = Duration::from_millis(5);
 
@@ -169,7 +168,7 @@ impl Poller {
             }
         }
         let counted = self.counted.map(|counted| counted.elapsed());
-        if counted.is_none_or(|age| age >= COUNTERS)
+        if counted.is_none_or(|age| age >= SELDOM)
             && self.writes.is_empty()
             && let Some(device) = &mut self.device
         {

@@ -41,8 +41,7 @@ pub async fn run(
     let book = of_modules(&book, set)?;
     match options {
         Config::Get { names } => {
-            let named = names.iter().map(|name| book.find(name));
-            let mut items: Vec<_> = named.collect::<Result<_, _>>()?;
+            let mut items = book.find_all(&names)?;
             if names.is_empty() {
                 items = book.settings().cloned().collect();
             }
@@ -57,14 +56,12 @@ pub async fn run(
             Progress::new(note, changes.len())
                 .write(&mut device, &changes)
                 .await?;
-            output::line(format_args!(
-                "written, but not saved: save with `modioctl config save`"
-            ))
+            output::line("written, but not saved: save with `modioctl config save`")
         }
         Config::Save => {
             device.unlock().await?;
             device.save().await?;
-            output::line(format_args!("saved"))?;
+            output::line("saved")?;
             tell_restart(&mut device).await
         }
         Config::Diff { file } => diff(&mut device, &book, file.as_deref()).await,
@@ -100,7 +97,7 @@ pub async fn run(
                 .order(Command::LoadDefaults.code(), "loading the factory settings")
                 .await?;
             device.save().await?;
-            output::line(format_args!("the factory settings are saved"))?;
+            output::line("the factory settings are saved")?;
             finish(device, restart).await
         }
     }
@@ -190,7 +187,7 @@ async fn diff(device: &mut Device, book: &Book, path: Option<&Path>) -> Result<(
     };
     let rows = differences(device, book, &wanted).await?;
     if rows.is_empty() {
-        return output::line(format_args!("no difference"));
+        return output::line("no difference");
     }
     table(rows, other)
 }
@@ -290,7 +287,7 @@ async fn import(
         )));
     }
     if progress.done == 0 {
-        output::line(format_args!("the unit has these settings already"))?;
+        output::line("the unit has these settings already")?;
     } else {
         output::line(format_args!("{} settings written", progress.done))?;
     }
@@ -300,7 +297,7 @@ async fn import(
     );
     device.save().await?;
     progress.note.replace("the settings are saved".to_owned());
-    output::line(format_args!("saved"))
+    output::line("saved")
 }
 
 /// Returns the settings whose values differ from those of the unit.
@@ -322,16 +319,14 @@ async fn finish(mut device: Device, restart: bool) -> Result<(), Failure> {
     if device.waits_for_restart().await? {
         device.unlock().await?;
         device.restart().await?;
-        output::line(format_args!("restarted: all settings are in force"))?;
+        output::line("restarted: all settings are in force")?;
     }
     Ok(())
 }
 
 async fn tell_restart(device: &mut Device) -> Result<(), Failure> {
     if device.waits_for_restart().await? {
-        output::line(format_args!(
-            "some settings take effect after a restart: use `modioctl reboot`"
-        ))?;
+        output::line("some settings take effect after a restart: use `modioctl reboot`")?;
     }
     Ok(())
 }
