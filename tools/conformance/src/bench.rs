@@ -69,6 +69,15 @@ impl<'a> Bench<'a> {
         if self.target.unit == 42 { 43 } else { 42 }
     }
 
+    /// Returns one of two values: the first where the endpoint's time is exact.
+    pub fn exact<T>(&self, exact: T, otherwise: T) -> T {
+        if self.endpoint.abilities().exact {
+            exact
+        } else {
+            otherwise
+        }
+    }
+
     /// Returns the frame of a request to this unit.
     pub fn frame(&self, pdu: &[u8]) -> Vec<u8> {
         self.target.mode.frame(self.target.unit, pdu)
@@ -122,11 +131,9 @@ impl<'a> Bench<'a> {
         // An operating system may deliver a frame in parts: wait for the rest of a part.
         let whole = |bytes: &[u8]| bytes.is_empty() || self.target.mode.decode(bytes).is_ok();
         while !self.endpoint.abilities().exact && bytes.len() < enough && !whole(&bytes) {
-            let more = self.endpoint.receive(
-                self.patience.quiet * 5,
-                self.patience.quiet,
-                enough - bytes.len(),
-            )?;
+            let quiet = self.patience.quiet;
+            let missing = enough - bytes.len();
+            let more = self.endpoint.receive(quiet * 5, quiet, missing)?;
             if more.is_empty() {
                 break;
             }
@@ -185,11 +192,8 @@ impl<'a> Bench<'a> {
 
     /// Sends a PDU and expects exactly this PDU in reply.
     pub fn reply_is(&mut self, pdu: &[u8], wanted: &[u8]) -> Check {
-        let reply = self.ask_due(pdu)?;
-        self.ensure(
-            reply == Reply::Pdu(wanted.to_vec()),
-            format!("the PDU {}", hex(wanted)),
-        )
+        let right = self.ask_due(pdu)? == Reply::Pdu(wanted.to_vec());
+        self.ensure(right, format!("the PDU {}", hex(wanted)))
     }
 
     /// Sends a PDU and expects this exception.
@@ -214,10 +218,8 @@ impl<'a> Bench<'a> {
     pub fn exception_03_or_silence(&mut self, pdu: &[u8]) -> Check {
         let reply = self.ask(pdu)?;
         let right = reply == Reply::Silence || reply.exception(pdu[0]) == Some(3);
-        self.ensure(
-            right,
-            format!("exception 03 to function {:02X}, or silence", pdu[0]),
-        )
+        let wanted = format!("exception 03 to function {:02X}, or silence", pdu[0]);
+        self.ensure(right, wanted)
     }
 
     /// Sends every beginning of a PDU that is shorter than the PDU, and the PDU with some bytes added. Each must get
@@ -244,6 +246,17 @@ impl<'a> Bench<'a> {
     /// Sends raw bytes and expects silence.
     pub fn silence_to(&mut self, bytes: &[u8], why: impl Display) -> Check {
         self.silence(&[Piece::Bytes(bytes.to_vec())], why)
+    }
+
+    /// Sends a PDU in a good frame to a unit, or to all units, and expects silence.
+    pub fn silence_of(&mut self, unit: u8, pdu: &[u8], why: impl Display) -> Check {
+        let frame = self.target.mode.frame(unit, pdu);
+        self.silence_to(&frame, why)
+    }
+
+    /// Sends the request of [`Bench::alive`] to another unit, or to all units, and expects silence.
+    pub fn silent_ping(&mut self, unit: u8, why: impl Display) -> Check {
+        self.silence_of(unit, &self.target.ping, why)
     }
 
     /// Sends an ordinary request, which the unit must answer.
@@ -285,6 +298,13 @@ impl<'a> Bench<'a> {
             Reply::Pdu(reply) if reply[0] == pdu[0] => Ok(reply),
             _ => self.fail(format!("a reply, or exception 01: {what}")),
         }
+    }
+
+    /// Returns the time from the end of the last request to the first start bit of the reply.
+    pub fn turnaround(&self) -> Duration {
+        let first = self.received.first();
+        let start = first.map_or(Duration::ZERO, |first| first.start);
+        start.saturating_sub(self.sent_end)
     }
 
     /// Lets time pass.

@@ -1,5 +1,7 @@
 //! Reads, writes and restores the unit's points for a case, by the functions that the unit has.
 
+use std::fmt::Display;
+
 use register_map::configuration::{KEY, OPENING_KEY};
 
 use crate::bench::Bench;
@@ -95,11 +97,22 @@ impl Bench<'_> {
         outside
     }
 
+    /// Checks the values of registers. `wanted` describes them.
+    pub fn words_are(&mut self, span: Span, values: &[u16], wanted: impl Display) -> Check {
+        let now = self.read_words(span)?;
+        self.ensure(now == values, wanted)
+    }
+
     /// Checks that a register still has this value.
     pub fn word_is(&mut self, address: u16, value: u16) -> Check {
-        let now = self.read_word(address)?;
         let wanted = format!("register {address:04X} still is {value:04X}");
-        self.ensure(now == value, wanted)
+        self.words_are(Span::one(address), &[value], wanted)
+    }
+
+    /// Checks the states of coils. `wanted` describes them.
+    pub fn bits_are(&mut self, span: Span, states: &[bool], wanted: impl Display) -> Check {
+        let now = self.read_bits(span)?;
+        self.ensure(now == states, wanted)
     }
 
     /// Checks that coils are still off.

@@ -72,6 +72,17 @@ pub struct Words {
     pub locked: bool,
 }
 
+impl Words {
+    /// Returns the accepted value that differs from this one.
+    pub const fn other(&self, value: u16) -> u16 {
+        if value == self.high {
+            self.low
+        } else {
+            self.high
+        }
+    }
+}
+
 /// The reply to the probe's request for a function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Support {

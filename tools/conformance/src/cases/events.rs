@@ -93,10 +93,8 @@ fn counter_counts(bench: &mut Bench<'_>) -> Check {
         bench.alive("the first reading of the count")?;
     }
     let after = events(bench)?;
-    bench.ensure(
-        after == before.wrapping_add(3),
-        format!("three messages done: {}", before.wrapping_add(3)),
-    )?;
+    let wanted = before.wrapping_add(3);
+    bench.ensure(after == wanted, format!("three messages done: {wanted}"))?;
     if let Some(function) = super::dispatch::unknown_functions(bench).pop() {
         bench.exception(&[function], 1)?;
         let same = events(bench)?;
@@ -121,12 +119,8 @@ fn log(bench: &mut Bench<'_>) -> Check<(u16, u16, Vec<u8>)> {
     )?;
     let status = u16::from_be_bytes([s1, s0]);
     bench.ensure(status == 0 || status == 0xFFFF, "a status of 0000 or FFFF")?;
-    let events = events.to_vec();
-    Ok((
-        u16::from_be_bytes([e1, e0]),
-        u16::from_be_bytes([m1, m0]),
-        events,
-    ))
+    let [count, messages] = [[e1, e0], [m1, m0]].map(u16::from_be_bytes);
+    Ok((count, messages, events.to_vec()))
 }
 
 fn log_shape(bench: &mut Bench<'_>) -> Check {
@@ -269,9 +263,8 @@ fn log_busy(bench: &mut Bench<'_>) -> Check {
 
 fn log_broadcast(bench: &mut Bench<'_>) -> Check {
     // A broadcast read has no effect on any unit, and no reply.
-    let frame = bench.target.mode.frame(0, &bench.target.ping);
     logs(bench, "a broadcast", &[&[0x40, 0xC0]], |bench| {
-        bench.silence_to(&frame, "a broadcast")
+        bench.silent_ping(0, "a broadcast")
     })
 }
 
@@ -297,10 +290,9 @@ fn log_bad_character(bench: &mut Bench<'_>) -> Check {
 }
 
 fn log_others(bench: &mut Bench<'_>) -> Check {
-    let frame = bench.target.mode.frame(bench.other(), &bench.target.ping);
     logs(bench, "requests for another unit", &[&[]], |bench| {
-        bench.silence_to(&frame, "the request is for another unit")?;
-        bench.silence_to(&frame, "the request is for another unit")
+        bench.silent_ping(bench.other(), "the request is for another unit")?;
+        bench.silent_ping(bench.other(), "the request is for another unit")
     })
 }
 

@@ -61,9 +61,7 @@ fn moves(
 }
 
 fn ping_other(bench: &mut Bench<'_>) -> Check {
-    let (other, ping) = (bench.other(), bench.target.ping.clone());
-    let frame = bench.target.mode.frame(other, &ping);
-    bench.silence_to(&frame, "another unit's request")
+    bench.silent_ping(bench.other(), "another unit's request")
 }
 
 /// Sends a broadcast that the unit refuses in silence, and that writes nothing.
@@ -79,8 +77,7 @@ fn refused_broadcast(bench: &mut Bench<'_>) -> Check {
     if function == 0x10 {
         request = crate::points::write_words(nowhere, &[0]);
     }
-    let frame = bench.target.mode.frame(0, &request);
-    bench.silence_to(&frame, "a broadcast")
+    bench.silence_of(0, &request, "a broadcast")
 }
 
 /// Returns a request whose check is wrong.

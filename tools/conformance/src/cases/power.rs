@@ -18,9 +18,9 @@ pub(super) const CASES: &[Case] = &[
 ];
 
 const OFF: Duration = Duration::from_millis(200);
-const START: Duration = Duration::from_secs(1);
+pub(super) const START: Duration = Duration::from_secs(1);
 
-fn cycle(bench: &mut Bench<'_>) -> Check {
+pub(super) fn cycle(bench: &mut Bench<'_>) -> Check {
     bench.endpoint.set_power(false)?;
     bench.rest(OFF)?;
     bench.endpoint.set_power(true)?;

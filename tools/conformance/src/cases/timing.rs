@@ -43,21 +43,13 @@ pub fn silence(bench: &mut Bench<'_>) -> Check<Duration> {
     Ok(line.t35_limits().least)
 }
 
-/// Returns the time from the end of the last request to the first start bit of the reply.
-fn turnaround(bench: &Bench<'_>) -> Duration {
-    let first = bench.received.first().map_or(Duration::ZERO, |h| h.start);
-    first.saturating_sub(bench.sent_end)
-}
-
 /// Allowance for times that were rounded to nanoseconds.
 const ROUNDING: Duration = Duration::from_nanos(10);
 
 fn not_before(bench: &Bench<'_>, least: Duration) -> Check {
-    let took = turnaround(bench);
-    bench.ensure(
-        took + ROUNDING >= least,
-        format!("a reply {least:?} after the request or later, not {took:?}"),
-    )
+    let took = bench.turnaround();
+    let wanted = format!("a reply {least:?} after the request or later, not {took:?}");
+    bench.ensure(took + ROUNDING >= least, wanted)
 }
 
 fn after_t35(bench: &mut Bench<'_>) -> Check {
@@ -87,11 +79,8 @@ fn exceptions_after_t35(bench: &mut Bench<'_>) -> Check {
 fn no_gap(bench: &mut Bench<'_>) -> Check {
     let t15 = bench.endpoint.line().t15_limits().least;
     for function in 1..=4 {
-        let Some(span) = bench
-            .target
-            .longest(function)
-            .filter(|_| bench.target.has(function))
-        else {
+        let span = bench.target.longest(function);
+        let Some(span) = span.filter(|_| bench.target.has(function)) else {
             continue;
         };
         let most = if function <= 2 { 2000 } else { 125 };

@@ -12,9 +12,6 @@ use super::{Direction, Waiting};
 use crate::failure::Failure;
 use register_map::state::PRODUCT_CODE;
 
-/// Pause after a broadcast, in which every unit executes it (V1.02, 2.4.1: 100 to 200 ms).
-const TURNAROUND: Duration = Duration::from_millis(100);
-
 /// Silence that ends an answer, in addition to the time of some characters. USB adapters deliver bytes in batches,
 /// 16 ms apart and more.
 const BATCH: Duration = Duration::from_millis(60);
@@ -155,13 +152,6 @@ impl Master {
             }
         }
         result
-    }
-
-    /// Sends a broadcast to all units.
-    pub async fn tell_all(&mut self, pdu: &[u8]) -> io::Result<()> {
-        self.send(0, pdu).await?;
-        self.free = self.free.max(Instant::now() + TURNAROUND);
-        Ok(())
     }
 
     /// Sends a request when the line is free. Returns before the request has been sent completely.
