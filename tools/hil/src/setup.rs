@@ -45,7 +45,7 @@ impl Cli {
         if !["8N2", "8E1", "8O1", "8N1"].contains(&format.as_str()) {
             bail!("a modio has no format {format}: use 8N2, 8E1, 8O1 or 8N1");
         }
-        let wires = setup.file.wires.len() + setup.file.analog.len();
+        let wires = setup.file.wires().len() + setup.file.analog().len();
         if self.no_suite && self.requests == 0 && wires == 0 {
             bail!("nothing to test: no suite, no requests, and no wires in a bench file");
         }
@@ -108,10 +108,10 @@ impl Setup {
             allow_config: cli.allow_config,
             cases: self.cases()?,
             requests: cli.requests,
-            rates: cli.rates.clone().map_or_else(Vec::new, |rates| rates.0),
+            rates: cli.rates.clone().unwrap_or_default(),
             limit: cli.limit.map(Duration::from_millis),
-            wires: file.wires.clone(),
-            analog: file.analog.clone(),
+            wires: file.wires(),
+            analog: file.analog(),
         })
     }
 

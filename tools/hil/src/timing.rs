@@ -61,7 +61,6 @@ fn echo(number: u16) -> Vec<u8> {
 /// Sends this number of requests, each as soon as the line allows. Ends early when `stop` is set.
 pub fn measure(bench: &mut Bench<'_>, requests: u32, stop: &AtomicBool) -> Check<Tally> {
     let line = bench.endpoint.line();
-    let exact = bench.endpoint.abilities().exact;
     let mut tally = Tally {
         line,
         sent: 0,
@@ -87,12 +86,9 @@ pub fn measure(bench: &mut Bench<'_>, requests: u32, stop: &AtomicBool) -> Check
             0
         };
         if reply == Reply::Pdu(request) {
-            if let (Some(first), Some(last)) = (bench.received.first(), bench.received.last()) {
-                times.push(if exact {
-                    first.start.saturating_sub(bench.sent_end)
-                } else {
-                    last.end.saturating_sub(begin + line.characters(2 * length))
-                });
+            if let Some(last) = bench.received.last() {
+                let whole = begin + line.characters(2 * length);
+                times.push(bench.exact(bench.turnaround(), last.end.saturating_sub(whole)));
             }
         } else {
             if reply == Reply::Silence {
@@ -137,20 +133,16 @@ impl Tally {
         }
         let shortest = self.spread.as_ref().map(|spread| spread.percentile(0));
         if let Some(shortest) = shortest.filter(|time| *time + TOLERANCE < self.least) {
-            return bad(
-                format!("a turnaround of {shortest:?}"),
-                format!("{:?} at least: t3.5, or FRAME_GAP", self.least),
-            );
+            let wanted = format!("{:?} at least: t3.5, or FRAME_GAP", self.least);
+            return bad(format!("a turnaround of {shortest:?}"), wanted);
         }
         match (&self.spread, limit) {
             (None, _) => Verdict::Skipped("interrupted before the first reply".to_owned()),
-            (Some(spread), Some(limit)) if spread.percentile(99) > limit => bad(
-                format!(
-                    "a turnaround of {:?} at the 99th percentile",
-                    spread.percentile(99)
-                ),
-                format!("{limit:?} at most"),
-            ),
+            (Some(spread), Some(limit)) if spread.percentile(99) > limit => {
+                let time = spread.percentile(99);
+                let came = format!("a turnaround of {time:?} at the 99th percentile");
+                bad(came, format!("{limit:?} at most"))
+            }
             (Some(_), _) => Verdict::Passed,
         }
     }

@@ -13,8 +13,8 @@ fn wired(text: &str) -> (Line, Plan) {
     line.units[0].bits[16] = true;
     let file = BenchFile::parse(text, None).unwrap();
     let plan = Plan {
-        wires: file.wires,
-        analog: file.analog,
+        wires: file.wires(),
+        analog: file.analog(),
         ..plan(&line)
     };
     (line, plan)
@@ -114,7 +114,7 @@ fn analog() -> (Line, Plan) {
     line.analog = vec![([(1, 18), (1, 16)], 20), ([(1, 19), (1, 17)], 20)];
     line.units[0].registers.insert(18, 1234);
     let plan = Plan {
-        analog: BenchFile::parse(ANALOG, None).unwrap().analog,
+        analog: BenchFile::parse(ANALOG, None).unwrap().analog(),
         ..plan(&line)
     };
     (line, plan)
