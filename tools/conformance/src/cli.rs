@@ -254,9 +254,8 @@ pub fn waits(endpoint: &dyn Endpoint, reply: Option<Duration>) -> Patience {
             quiet: line.t35() + line.characters(1),
         }
     } else {
-        let wait = reply
-            .unwrap_or(Duration::from_millis(250))
-            .max(line.t35() * 3);
+        let reply = reply.unwrap_or(Duration::from_millis(250));
+        let wait = reply.max(line.t35() * 3);
         Patience {
             // A reply ends the wait, so a long wait costs time only when no reply is received.
             reply: wait * 4,
@@ -271,8 +270,8 @@ mod tests {
     use super::*;
     use clap::CommandFactory;
 
-    fn parse(arguments: &[&str]) -> Cli {
-        Cli::try_parse_from(std::iter::once(&"x").chain(arguments)).unwrap()
+    fn parse(arguments: &str) -> Cli {
+        Cli::try_parse_from(format!("x {arguments}").split_whitespace()).unwrap()
     }
 
     #[test]
@@ -285,35 +284,24 @@ mod tests {
 
     #[test]
     fn missing_endpoint_is_an_error_that_names_the_options() {
-        let text = parse(&[]).open(Mode::Rtu).err().unwrap().to_string();
-        assert!(
-            text.contains("--serial") && text.contains("--tcp"),
-            "{text}"
-        );
-        let wrong = parse(&["--format", "7E1"]).open(Mode::Rtu).err().unwrap();
+        let text = parse("").open(Mode::Rtu).err().unwrap().to_string();
+        let both = text.contains("--serial") && text.contains("--tcp");
+        assert!(both, "{text}");
+        let wrong = parse("--format 7E1").open(Mode::Rtu).err().unwrap();
         assert!(wrong.to_string().contains("--ascii"), "{wrong}");
     }
 
     #[test]
     fn cases_are_chosen_by_parts_of_their_names() {
-        let all = parse(&[]).cases().unwrap().len();
-        let some = parse(&["--only", "fc05/", "--only", "ascii/"])
-            .cases()
-            .unwrap();
+        let all = parse("").cases().unwrap().len();
+        let some = parse("--only fc05/ --only ascii/").cases().unwrap();
         assert!(some.len() > 10 && some.len() < all);
-        assert!(parse(&["--only", "no such case"]).cases().is_err());
-        let fewer = parse(&[
-            "--only",
-            "fc05/",
-            "--exclude",
-            "length",
-            "--exclude",
-            "value",
-        ]);
+        assert!(parse("--only no-such-case").cases().is_err());
+        let fewer = parse("--only fc05/ --exclude length --exclude value");
         let names: Vec<_> = fewer.cases().unwrap().iter().map(|c| c.name).collect();
         assert_eq!(names, ["fc05/on-and-off", "fc05/address"]);
-        assert!(parse(&["--exclude", "/"]).cases().is_err());
-        let standard = parse(&["--standard-only", "--only", "fc05/", "--only", "config/"]);
+        assert!(parse("--exclude /").cases().is_err());
+        let standard = parse("--standard-only --only fc05/ --only config/");
         let names: Vec<_> = standard.cases().unwrap().iter().map(|c| c.name).collect();
         assert!(names.contains(&"fc05/value") && !names.contains(&"fc05/length"));
         assert!(names.iter().all(|name| name.starts_with("fc05/")));
@@ -321,10 +309,10 @@ mod tests {
 
     #[test]
     fn unit_is_that_of_the_option_then_of_the_profile_then_1() {
-        assert_eq!(parse(&[]).unit(None), 1);
-        assert_eq!(parse(&["--unit", "9"]).unit(None), 9);
+        assert_eq!(parse("").unit(None), 1);
+        assert_eq!(parse("--unit 9").unit(None), 9);
         let profile = Profile::parse("unit = 17").unwrap();
-        assert_eq!(parse(&[]).unit(Some(&profile)), 17);
-        assert_eq!(parse(&["--unit", "9"]).unit(Some(&profile)), 9);
+        assert_eq!(parse("").unit(Some(&profile)), 17);
+        assert_eq!(parse("--unit 9").unit(Some(&profile)), 9);
     }
 }

@@ -221,15 +221,11 @@ fn logs(
 }
 
 fn log_reply(bench: &mut Bench<'_>) -> Check {
-    logs(
-        bench,
-        "two requests",
-        &[&[0x40, 0x80, 0x40, 0x80]],
-        |bench| {
-            bench.alive("a reading of the log")?;
-            bench.alive("a request")
-        },
-    )
+    let right = [0x40, 0x80, 0x40, 0x80];
+    logs(bench, "two requests", &[&right], |bench| {
+        bench.alive("a reading of the log")?;
+        bench.alive("a request")
+    })
 }
 
 fn log_exceptions(bench: &mut Bench<'_>) -> Check {
@@ -270,15 +266,11 @@ fn log_broadcast(bench: &mut Bench<'_>) -> Check {
 
 fn log_bad_check(bench: &mut Bench<'_>) -> Check {
     let frame = line_counters::bad(bench);
-    logs(
-        bench,
-        "two frames with a bad check",
-        &[&[0x82, 0x82]],
-        |bench| {
-            bench.silence_to(&frame, "the check is wrong")?;
-            bench.silence_to(&frame, "the check is wrong")
-        },
-    )
+    let what = "two frames with a bad check";
+    logs(bench, what, &[&[0x82, 0x82]], |bench| {
+        bench.silence_to(&frame, "the check is wrong")?;
+        bench.silence_to(&frame, "the check is wrong")
+    })
 }
 
 fn log_bad_character(bench: &mut Bench<'_>) -> Check {
@@ -309,11 +301,9 @@ fn log_restart(bench: &mut Bench<'_>) -> Check {
 fn log_listen_only(bench: &mut Bench<'_>) -> Check {
     diagnostics::needs_listen_only(bench)?;
     let ping = bench.target.ping.clone();
+    let why = "in listen-only mode nothing is answered";
     let frames = [
-        (
-            bench.frame(&ping),
-            "in listen-only mode nothing is answered",
-        ),
+        (bench.ping(), why),
         (bench.target.mode.frame(0, &ping), "a broadcast"),
         (line_counters::bad(bench), "the check is wrong"),
     ];

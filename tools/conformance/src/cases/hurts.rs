@@ -196,14 +196,14 @@ fn half_written(bench: &mut Bench<'_>) -> Check {
     let slot = bench.target.modio.and_then(|modio| modio.slots().next());
     let at = counters::of_point(slot.map_or(0, |(port, _)| points::first(port)));
     let before = bench.reply(&pdu(3, at, 2))?;
-    for request in [
-        crate::points::write_words(at, &[0]),
-        crate::points::write_words(at + 1, &[0]),
-        crate::points::write_words(at + 1, &[0, 0]),
-        crate::points::write_words(at, &[0, 1]),
-        crate::points::write_words(at, &[0, 0, 0]),
+    for (from, words) in [
+        (at, &[0][..]),
+        (at + 1, &[0]),
+        (at + 1, &[0, 0]),
+        (at, &[0, 1]),
+        (at, &[0, 0, 0]),
     ] {
-        bench.exception(&request, 3)?;
+        bench.exception(&crate::points::write_words(from, words), 3)?;
     }
     let now = bench.reply(&pdu(3, at, 2))?;
     bench.ensure(now == before, "the counter is unchanged")

@@ -198,9 +198,8 @@ impl<T: Transport> Endpoint for ExactLine<T> {
 
     fn take_driver_edges(&mut self) -> Result<Vec<(Duration, bool)>, Broken> {
         if !self.can(Ability::Driver) {
-            return Err(Broken(
-                "this endpoint does not record the driver".to_owned(),
-            ));
+            let why = "this endpoint does not record the driver";
+            return Err(Broken(why.to_owned()));
         }
         Ok(std::mem::take(&mut self.driver_edges))
     }
@@ -247,10 +246,8 @@ impl Tcp {
 
 impl Transport for Tcp {
     fn ask(&mut self, request: &Request) -> Result<Reply, String> {
-        let written = self
-            .stream
-            .get_mut()
-            .write_all(format!("{request}\n").as_bytes());
+        let text = format!("{request}\n");
+        let written = self.stream.get_mut().write_all(text.as_bytes());
         let mut line = String::new();
         let read = self.stream.read_line(&mut line);
         match (written, read) {
