@@ -31,6 +31,14 @@ pub(super) fn run_plan(
     (report, ended.map_err(|error| format!("{error:#}")))
 }
 
+/// Asserts that a text has these parts.
+#[track_caller]
+pub(super) fn has(text: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+}
+
 pub(super) fn never() -> AtomicBool {
     AtomicBool::new(false)
 }
@@ -102,25 +110,19 @@ fn lost_and_stale_replies_are_counted_apart_and_fail_the_run() {
     let (report, ended) = measured(&mut line, 100, &[]);
     assert_eq!(ended, Ok(()));
     let tally = &report.timing[0];
-    assert_eq!(
-        (tally.sent, tally.lost, tally.wrong),
-        (100, 2, 1),
-        "{tally}"
-    );
+    let counted = (tally.sent, tally.lost, tally.wrong);
+    assert_eq!(counted, (100, 2, 1), "{tally}");
     let Verdict::Failed(failure) = &report.findings[0].verdict else {
         panic!("{}", report.findings[0]);
     };
-    assert!(
-        failure
-            .came
-            .starts_with("2 lost, 1 wrong, the first to 01 08 00 00"),
-        "{failure:?}"
+    has(
+        &failure.came,
+        &["2 lost, 1 wrong, the first to 01 08 00 00"],
     );
     assert!(report.failed().eq(["timing/9600 8N2"]));
-    assert!(
-        report
-            .junit()
-            .contains("name=\"hil\" tests=\"1\" failures=\"1\"")
+    has(
+        &report.junit(),
+        &["name=\"hil\" tests=\"1\" failures=\"1\""],
     );
 }
 
@@ -208,10 +210,7 @@ fn rate_that_cannot_be_restored_is_an_error_with_the_rate_at_which_the_unit_last
     });
     let (report, ended) = measured(&mut line, 5, &[19_200]);
     let text = ended.unwrap_err();
-    assert!(
-        text.contains("back to 9600 8N2") && text.contains("last answered at 19200 8N2"),
-        "{text}"
-    );
+    has(&text, &["back to 9600 8N2", "last answered at 19200 8N2"]);
     assert_eq!(report.timing.len(), 1, "the report has the measurement");
 }
 
@@ -243,11 +242,8 @@ fn unit_with_another_module_than_the_bench_is_not_tested() {
         ..plan(&line)
     };
     let (report, ended) = run_plan(&mut line, &plan, &never());
-    let error = ended.unwrap_err();
-    assert_eq!(
-        error,
-        "unit 1 has the module 4do in force, but the bench has 4ao"
-    );
+    let error = "unit 1 has the module 4do in force, but the bench has 4ao";
+    assert_eq!(ended.unwrap_err(), error);
     assert!(report.timing.is_empty());
     let plan = Plan {
         module: Some(Module::Do4),
@@ -272,10 +268,7 @@ fn reports_say_which_unit_was_tested() {
         (&"4do".into(), true)
     );
     let xml = report.junit();
-    assert!(
-        xml.contains("<property name=\"firmware\" value=\"1.2.3\"/>"),
-        "{xml}"
-    );
+    has(&xml, &["<property name=\"firmware\" value=\"1.2.3\"/>"]);
 
     // Register map 2 has the commit.
     let registers = &mut line.units[0].registers;

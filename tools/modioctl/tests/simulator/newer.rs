@@ -6,7 +6,7 @@ use modio_description::{Description, Register, Scope, Unit, Value, Values, check
 use register_map::Module;
 use register_map::board::MODIO_02;
 
-use crate::program::At;
+use crate::program::{At, has};
 use crate::served::{response, serve_requests, server};
 
 /// Returns the description: that of a modio-02 with new parts.
@@ -87,10 +87,7 @@ fn a_newer_unit_is_read_by_its_own_description() {
     let again = at.run("describe");
     assert!(again.err.is_empty(), "stored before: {again:?}");
     let text = again.fine();
-    assert!(
-        text.contains("modio-99") && text.contains("Where the valve opens"),
-        "{text}"
-    );
+    has(&text, &["modio-99", "Where the valve opens"]);
     let text = at.run("read PRESURE_LIMIT").failed(2);
     assert!(text.contains("PRESSURE_LIMIT"), "{text}");
 }
@@ -150,8 +147,5 @@ fn an_export_of_several_units_needs_all_of_them() {
     let error = at
         .run("--timeout 50ms --retries 0 export --units 1,9 csv")
         .failed(3);
-    assert!(
-        error.contains("without unit 9") && error.contains("--units"),
-        "{error}"
-    );
+    has(&error, &["without unit 9", "--units"]);
 }
