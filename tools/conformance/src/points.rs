@@ -2,29 +2,16 @@
 
 use std::fmt::Display;
 
+pub use modbus_line::adu::{pdu, words_of, write_words};
 use register_map::configuration::{KEY, OPENING_KEY};
 
 use crate::bench::Bench;
 use crate::case::{Check, Stop};
 use crate::target::{Span, Words};
 
-/// Returns a request's function, address and one more word.
-pub fn pdu(function: u8, address: u16, word: u16) -> Vec<u8> {
-    let ([ah, al], [wh, wl]) = (address.to_be_bytes(), word.to_be_bytes());
-    vec![function, ah, al, wh, wl]
-}
-
 /// Returns a request of function 08.
 pub fn diagnose(sub: u16, data: &[u8]) -> Vec<u8> {
     [&[8], &sub.to_be_bytes()[..], data].concat()
-}
-
-/// Returns a write of several registers, 0x10.
-pub fn write_words(address: u16, values: &[u16]) -> Vec<u8> {
-    let mut request = pdu(0x10, address, values.len() as u16);
-    request.push((values.len() * 2) as u8);
-    request.extend(values.iter().flat_map(|value| value.to_be_bytes()));
-    request
 }
 
 /// Returns a write of several coils, 0x0F; the padding bits of the last byte are `padding`.
@@ -38,12 +25,6 @@ pub fn write_bits(address: u16, values: &[bool], padding: bool) -> Vec<u8> {
         })
     }));
     request
-}
-
-/// Returns the words of a reply to 03, 04 or 17.
-pub fn words_of(reply: &[u8]) -> Vec<u16> {
-    let (pairs, _) = reply.get(2..).unwrap_or_default().as_chunks::<2>();
-    pairs.iter().map(|pair| u16::from_be_bytes(*pair)).collect()
 }
 
 /// The values of the points that cases write to, before a case.

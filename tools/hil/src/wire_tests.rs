@@ -132,14 +132,14 @@ fn wrong_analog_wires_fail_each_with_its_reason() {
     let [inexact] = &failing((line, plan))[..] else {
         panic!("one wire is inexact");
     };
-    has(&inexact, &["unit 1 point 0x0011 is 21 after"]);
+    has(inexact, &["unit 1 point 0x0011 is 21 after"]);
 
     let (mut line, plan) = analog();
     line.analog.pop();
     let [broken] = &failing((line, plan))[..] else {
         panic!("one wire is broken");
     };
-    has(&broken, &["unit 1 point 0x0011 is 0 after"]);
+    has(broken, &["unit 1 point 0x0011 is 0 after"]);
 
     let (mut line, plan) = analog();
     line.analog[1].0[0] = (1, 18);

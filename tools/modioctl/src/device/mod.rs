@@ -4,6 +4,7 @@ mod learn;
 mod orders;
 mod several;
 
+use modbus_line::adu::{pdu, words_of, write_words};
 use modbus_line::names;
 
 pub use learn::{fetch, known};
@@ -60,11 +61,9 @@ impl Device {
         while done < count {
             let now = (count - done).min(MOST_WORDS);
             let from = first.wrapping_add(done);
-            let request = head(3, from, now);
             let about = format!("reading {}", span(from, now));
-            let response = self.ask(&request, &about).await?;
-            let (pairs, _) = response.get(2..).unwrap_or_default().as_chunks::<2>();
-            words.extend(pairs.iter().map(|pair| u16::from_be_bytes(*pair)));
+            let response = self.ask(&pdu(3, from, now), &about).await?;
+            words.extend(words_of(&response));
             done += now;
         }
         Ok(words)
@@ -73,13 +72,11 @@ impl Device {
     /// Reads bits from `first` on, by function 01.
     pub async fn read_bits(&mut self, first: u16, count: u16) -> Result<Vec<bool>, Failure> {
         let count = count.min(MOST_BITS);
-        let request = head(1, first, count);
         let about = format!("reading {}", span(first, count));
-        let response = self.ask(&request, &about).await?;
+        let response = self.ask(&pdu(1, first, count), &about).await?;
         let bytes = response.get(2..).unwrap_or_default();
-        let bits = bytes
-            .iter()
-            .flat_map(|byte| (0..8).map(move |bit| byte >> bit & 1 == 1));
+        let each = |byte: &u8| [0, 1, 2, 3, 4, 5, 6, 7].map(|bit| byte >> bit & 1 == 1);
+        let bits = bytes.iter().flat_map(each);
         Ok(bits.take(count.into()).collect())
     }
 
@@ -91,15 +88,12 @@ impl Device {
         about: &str,
     ) -> Result<(), Failure> {
         if let [word] = words {
-            self.ask(&head(6, first, *word), about).await?;
+            self.ask(&pdu(6, first, *word), about).await?;
             return Ok(());
         }
         for (n, words) in (0_u16..).zip(words.chunks(MOST_WRITTEN)) {
             let from = first.wrapping_add(n * MOST_WRITTEN as u16);
-            let mut request = head(0x10, from, words.len() as u16);
-            request.push(words.len() as u8 * 2);
-            request.extend(words.iter().flat_map(|word| word.to_be_bytes()));
-            self.ask(&request, about).await?;
+            self.ask(&write_words(from, words), about).await?;
         }
         Ok(())
     }
@@ -107,7 +101,7 @@ impl Device {
     /// Writes one bit, by function 05.
     pub async fn write_bit(&mut self, address: u16, on: bool, about: &str) -> Result<(), Failure> {
         let word = if on { 0xFF00 } else { 0 };
-        self.ask(&head(5, address, word), about).await?;
+        self.ask(&pdu(5, address, word), about).await?;
         Ok(())
     }
 
@@ -119,11 +113,7 @@ impl Device {
         count: u16,
     ) -> Result<Vec<u8>, Failure> {
         let mut request = vec![0x14, 7, 6];
-        request.extend(
-            [file, first, count]
-                .iter()
-                .flat_map(|word| word.to_be_bytes()),
-        );
+        request.extend([file, first, count].map(u16::to_be_bytes).as_flattened());
         let about = format!("reading file {file}");
         let response = self.ask(&request, &about).await?;
         // After function, total length, length of the group and reference type.
@@ -205,13 +195,6 @@ pub fn place(endpoint: &Endpoint) -> String {
         Place::Tcp(address) => address.clone(),
         Place::ModbusTcp(address) => format!("{address} (Modbus TCP)"),
     }
-}
-
-fn head(function: u8, first: u16, second: u16) -> Vec<u8> {
-    let mut pdu = vec![function];
-    pdu.extend(first.to_be_bytes());
-    pdu.extend(second.to_be_bytes());
-    pdu
 }
 
 fn span(first: u16, count: u16) -> String {
