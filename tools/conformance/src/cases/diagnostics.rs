@@ -72,18 +72,14 @@ fn data_refused(bench: &mut Bench<'_>) -> Check {
             if reply.exception(8) == Some(1) {
                 break;
             }
-            bench.ensure(
-                reply.exception(8) == Some(3),
-                format!("exception 03: 08/{sub:02X} takes 0000 only"),
-            )?;
+            let wanted = format!("exception 03: 08/{sub:02X} takes 0000 only");
+            bench.ensure(reply.exception(8) == Some(3), wanted)?;
         }
         for short in [&[][..], &[0], &[0, 0, 0]] {
             let reply = bench.ask(&diagnose(sub, short))?;
             let right = reply == Reply::Silence || matches!(reply.exception(8), Some(1 | 3));
-            bench.ensure(
-                right,
-                format!("exception 03 or silence: 08/{sub:02X} takes two bytes"),
-            )?;
+            let wanted = format!("exception 03 or silence: 08/{sub:02X} takes two bytes");
+            bench.ensure(right, wanted)?;
         }
     }
     Ok(())
@@ -96,10 +92,8 @@ fn length(bench: &mut Bench<'_>) -> Check {
 
 fn register(bench: &mut Bench<'_>) -> Check {
     let reply = bench.reply_unless_lacking(&diagnose(2, &[0, 0]), "08/02")?;
-    bench.ensure(
-        reply.len() == 5 && reply[..3] == [8, 0, 2],
-        "08 00 02 and two bytes",
-    )
+    let wanted = "08 00 02 and two bytes";
+    bench.ensure(reply.len() == 5 && reply[..3] == [8, 0, 2], wanted)
 }
 
 fn restart(bench: &mut Bench<'_>) -> Check {
@@ -237,10 +231,8 @@ fn clear(bench: &mut Bench<'_>) -> Check {
             .get(3..5)
             .map(|word| u16::from_be_bytes([word[0], word[1]]));
         let right = value.is_some_and(|value| value <= moved);
-        bench.ensure(
-            right,
-            format!("08/{sub:02X} is {moved} at most after 08/0A"),
-        )?;
+        let wanted = format!("08/{sub:02X} is {moved} at most after 08/0A");
+        bench.ensure(right, wanted)?;
     }
     Ok(())
 }
@@ -250,8 +242,6 @@ fn clear_overruns(bench: &mut Bench<'_>) -> Check {
     let reply = bench.reply_unless_lacking(&request, "08/14")?;
     bench.ensure(reply == request, "the request echoed")?;
     let overruns = bench.reply_unless_lacking(&diagnose(0x12, &[0, 0]), "08/12")?;
-    bench.ensure(
-        overruns == diagnose(0x12, &[0, 0]),
-        "the overrun counter is 0",
-    )
+    let wanted = "the overrun counter is 0";
+    bench.ensure(overruns == diagnose(0x12, &[0, 0]), wanted)
 }

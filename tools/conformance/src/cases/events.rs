@@ -141,14 +141,10 @@ fn log_counts(bench: &mut Bench<'_>) -> Check {
     let (logged, later, _) = log(bench)?;
     // 6.9 does not define whether 0C counts itself after its reply.
     let more = logged.wrapping_sub(count);
-    bench.ensure(
-        more == 1 || more == 2,
-        "one message more is done, or two with the first 0C",
-    )?;
-    bench.ensure(
-        later == messages.wrapping_add(2),
-        "two messages more, this one included, have come",
-    )
+    let wanted = "one message more is done, or two with the first 0C";
+    bench.ensure(more == 1 || more == 2, wanted)?;
+    let wanted = "two messages more, this one included, have come";
+    bench.ensure(later == messages.wrapping_add(2), wanted)
 }
 
 fn log_order(bench: &mut Bench<'_>) -> Check {
@@ -160,19 +156,15 @@ fn log_order(bench: &mut Bench<'_>) -> Check {
     let sent = |event: &u8| event & 0xC0 == 0x40;
     let skip = usize::from(events.first().is_some_and(receive));
     let right = events.get(skip).is_some_and(sent) && events.get(skip + 1).is_some_and(receive);
-    bench.ensure(
-        right,
-        "the last reply sent (40-7F), and before it its request received (80-FF)",
-    )?;
+    let wanted = "the last reply sent (40-7F), and before it its request received (80-FF)";
+    bench.ensure(right, wanted)?;
     if let Some(function) = super::dispatch::unknown_functions(bench).pop() {
         bench.exception(&[function], 1)?;
         let (_, _, events) = log(bench)?;
         let skip = usize::from(events.first().is_some_and(receive));
         let exception = events.get(skip).is_some_and(|event| event & 0xC1 == 0x41);
-        bench.ensure(
-            exception,
-            "a reply with exception 01 is 41: read exception sent",
-        )?;
+        let wanted = "a reply with exception 01 is 41: read exception sent";
+        bench.ensure(exception, wanted)?;
     }
     Ok(())
 }
@@ -185,10 +177,8 @@ fn log_cleared(bench: &mut Bench<'_>) -> Check {
     bench.ensure(before.len() > 6, "a log of the messages before")?;
     bench.reply_unless_lacking(&diagnose(1, &[0xFF, 0]), "08/01")?;
     let (_, _, events) = log(bench)?;
-    bench.ensure(
-        events.len() <= 4,
-        "no event from before the restart with FF00",
-    )?;
+    let wanted = "no event from before the restart with FF00";
+    bench.ensure(events.len() <= 4, wanted)?;
     bench.ensure(events.contains(&0), "event 00, the restart")
 }
 

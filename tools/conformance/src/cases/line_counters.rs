@@ -54,10 +54,8 @@ fn moves(
     done(bench)?;
     let after = count(bench, sub)?;
     let moved = after.wrapping_sub(before);
-    bench.ensure(
-        moved == wanted,
-        format!("counter {sub:02X} has moved by {wanted} ({what}), not by {moved}"),
-    )
+    let must = format!("counter {sub:02X} has moved by {wanted} ({what}), not by {moved}");
+    bench.ensure(moved == wanted, must)
 }
 
 fn ping_other(bench: &mut Bench<'_>) -> Check {

@@ -165,10 +165,8 @@ fn quantities_most(bench: &mut Bench<'_>) -> Check {
     // Write the values that the registers already have.
     let values = bench.read_words(wide.up_to(121))?;
     let reply = bench.reply(&both(run.up_to(125), wide.first, &values))?;
-    bench.ensure(
-        reply.len() == 252 && reply[1] == 250,
-        "250 data bytes and the byte count 250",
-    )?;
+    let must = "250 data bytes and the byte count 250";
+    bench.ensure(reply.len() == 252 && reply[1] == 250, must)?;
     let wanted = "the registers hold what was written";
     bench.words_are(wide.up_to(121), &values, wanted)
 }

@@ -231,10 +231,8 @@ fn reads_around_the_end(bench: &mut Bench<'_>, timeout: Duration) -> Check {
         let values = read_all(bench, function, span)?;
         held += u32::from(values == high);
         safe += u32::from(values == low);
-        bench.ensure(
-            values == high || values == low,
-            "every output as written, or every output at SAFE",
-        )?;
+        let wanted = "every output as written, or every output at SAFE";
+        bench.ensure(values == high || values == low, wanted)?;
     }
     // If the watchdog trips in none or in all of the reads, no read was near the end of the timeout.
     bench.ensure(

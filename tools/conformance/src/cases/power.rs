@@ -43,10 +43,8 @@ fn mid_traffic(bench: &mut Bench<'_>) -> Check {
     for byte in [0x55, 0x00, 0xFF] {
         cycle(bench)?;
         let bytes = [vec![byte; length], bench.ping()].concat();
-        bench.silence(
-            &[Piece::Bytes(bytes)],
-            "no silence has come before the request",
-        )?;
+        let wanted = "no silence has come before the request";
+        bench.silence(&[Piece::Bytes(bytes)], wanted)?;
         bench.alive("the first silence")?;
     }
     Ok(())
@@ -55,8 +53,6 @@ fn mid_traffic(bench: &mut Bench<'_>) -> Check {
 fn no_byte(bench: &mut Bench<'_>) -> Check {
     cycle(bench)?;
     let received = bench.endpoint.receive(START, START, usize::MAX)?;
-    bench.ensure(
-        received.is_empty(),
-        format!("silence while the unit starts: {received:?}"),
-    )
+    let wanted = format!("silence while the unit starts: {received:?}");
+    bench.ensure(received.is_empty(), wanted)
 }

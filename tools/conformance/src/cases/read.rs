@@ -82,10 +82,8 @@ fn quantity_most<const F: u8>(bench: &mut Bench<'_>) -> Check {
     let request = pdu(F, span.map_or(0, |span| span.first), quantity);
     if span.is_some_and(|span| span.len() >= u32::from(quantity)) {
         let reply = bench.reply(&request)?;
-        return bench.ensure(
-            reply.len() == 252 && reply[1] == 250,
-            "250 data bytes and the byte count 250",
-        );
+        let wanted = "250 data bytes and the byte count 250";
+        return bench.ensure(reply.len() == 252 && reply[1] == 250, wanted);
     }
     bench.exception(&request, 2)
 }
@@ -150,10 +148,8 @@ fn alike<const A: u8, const B: u8>(bench: &mut Bench<'_>) -> Check {
         let quantity = span.len().min(u32::from(most(A))) as u16;
         let before = bench.reply(&pdu(A, span.first, quantity))?;
         let other = bench.reply(&pdu(B, span.first, quantity))?;
-        bench.ensure(
-            other.len() == before.len(),
-            format!("as long as by function {A:02X}"),
-        )?;
+        let wanted = format!("as long as by function {A:02X}");
+        bench.ensure(other.len() == before.len(), wanted)?;
         // Inputs and counters may change between the reads. Compare only the bytes that did not change.
         let after = bench.reply(&pdu(A, span.first, quantity))?;
         for at in (1..before.len()).filter(|at| before[*at] == after[*at]) {

@@ -91,10 +91,8 @@ fn no_gap(bench: &mut Bench<'_>) -> Check {
             .windows(2)
             .map(|two| two[1].start.saturating_sub(two[0].end));
         let longest = gaps.max().unwrap_or_default();
-        bench.ensure(
-            longest < t15,
-            format!("gaps below t1.5, {t15:?}, in the reply, not {longest:?}"),
-        )?;
+        let wanted = format!("gaps below t1.5, {t15:?}, in the reply, not {longest:?}");
+        bench.ensure(longest < t15, wanted)?;
     }
     Ok(())
 }
@@ -114,10 +112,8 @@ fn driver(bench: &mut Bench<'_>) -> Check {
         let (Some(first), Some(last)) = (bench.received.first(), bench.received.last()) else {
             return bench.fail("a reply");
         };
-        bench.ensure(
-            on <= first.start + ROUNDING,
-            "the driver on before the first start bit",
-        )?;
+        let wanted = "the driver on before the first start bit";
+        bench.ensure(on <= first.start + ROUNDING, wanted)?;
         bench.ensure(
             off + ROUNDING >= last.end,
             format!(
@@ -126,14 +122,10 @@ fn driver(bench: &mut Bench<'_>) -> Check {
             ),
         )?;
         // The next request may follow t3.5 after the reply.
-        bench.ensure(
-            off <= last.end + line.t15_limits().most,
-            "the driver off well before the next request may come",
-        )?;
-        bench.ensure(
-            first.start <= on + line.t35_limits().most,
-            "the first start bit soon after the driver is on",
-        )?;
+        let wanted = "the driver off well before the next request may come";
+        bench.ensure(off <= last.end + line.t15_limits().most, wanted)?;
+        let wanted = "the first start bit soon after the driver is on";
+        bench.ensure(first.start <= on + line.t35_limits().most, wanted)?;
     }
     Ok(())
 }

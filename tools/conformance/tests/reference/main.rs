@@ -1,6 +1,7 @@
 //! Runs the suite against a unit made of the reference server. Without a fault the unit passes every case. Each fault
 //! makes the cases fail that have to find it.
 
+mod command;
 mod endpoint;
 mod fault;
 mod modio;

@@ -1,23 +1,5 @@
 //! The command: its exit status, its output and its files. It tests the reference server over a socket.
 
-#[path = "reference/fault.rs"]
-#[allow(dead_code, reason = "the list of faults is for the test of the cases")]
-mod fault;
-#[path = "reference/modio.rs"]
-#[allow(dead_code, reason = "the unit behind the socket is not a modio")]
-mod modio;
-#[path = "reference/modio_fault.rs"]
-#[allow(dead_code, reason = "the unit behind the socket is not a modio")]
-mod modio_fault;
-#[path = "reference/server.rs"]
-mod server;
-#[path = "reference/unit.rs"]
-#[allow(
-    dead_code,
-    reason = "an endpoint without exact time needs a part of it"
-)]
-mod unit;
-
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::process::{Command, Output};
@@ -25,10 +7,11 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use conformance::frame::Mode;
-use fault::Fault;
 use modbus_line::LineFormat;
 use tempfile::TempDir;
-use unit::{Character, Unit};
+
+use super::fault::Fault;
+use super::unit::{Character, Unit};
 
 const PROFILE: &str = r#"
 unit = 9
