@@ -19,10 +19,8 @@ pub async fn run(device: &mut Device, options: &Write) -> Result<(), Failure> {
         let words = parse(&item, text, options.raw)?;
         checked.push((item, words));
     }
-    if checked
-        .iter()
-        .any(|(item, _)| item.setting || item.name == "COMMAND")
-    {
+    let is_locked = |item: &Item| item.setting || item.name == "COMMAND";
+    if checked.iter().any(|(item, _)| is_locked(item)) {
         device.unlock().await?;
     }
     let settings = checked.iter().filter(|(item, _)| item.setting);
@@ -38,11 +36,8 @@ pub async fn run(device: &mut Device, options: &Write) -> Result<(), Failure> {
         } else {
             ""
         };
-        output::line(format_args!(
-            "{} = {}{when}",
-            item.name,
-            show(item, words, options.raw)
-        ))?;
+        let value = show(item, words, options.raw);
+        output::line(format_args!("{} = {value}{when}", item.name))?;
     }
     if unsaved {
         output::line("not saved: save with `modioctl config save`")?;

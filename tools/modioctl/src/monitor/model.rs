@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
+use modio_description::Description;
 use tokio::time::Instant;
 
 use super::editor::Editor;
@@ -10,7 +11,7 @@ use super::frames::Frames;
 use super::history::History;
 use super::link::Link;
 use super::messages::{Polled, Update, Write};
-use super::plan::{is_analog, title};
+use super::plan::is_analog;
 use super::tree::{Row, Tree};
 use crate::failure::Failure;
 use crate::names::{Book, Item};
@@ -185,6 +186,7 @@ impl Model {
             let text = format!("the unit has other modules or settings than before{dropped}");
             self.say(&text, now);
         }
+        let title = |unit: &Description| format!("{} {}", unit.board, unit.firmware);
         self.title = book.description().map(title).unwrap_or_default();
         self.tree.set(book.ports());
         self.book = book;

@@ -2,8 +2,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use modio_description::Description;
-
 use crate::names::{Book, Item, Meaning, PortItems};
 
 /// Values by the name of their item.
@@ -116,11 +114,6 @@ impl Plan {
         let module = words.get(&format!("p{}.module", port.number));
         module.is_some_and(|module| module.first() != Some(&port.code))
     }
-}
-
-/// Returns the name and the firmware of a unit, for people.
-pub fn title(description: &Description) -> String {
-    format!("{} {}", description.board, description.firmware)
 }
 
 /// Returns whether an item is an analog point.

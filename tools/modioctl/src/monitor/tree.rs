@@ -70,6 +70,19 @@ impl Tree {
         }
     }
 
+    /// Opens a port that is closed, or closes it.
+    pub fn toggle(&mut self, port: u8) {
+        self.set_open(port, !self.is_open(port));
+    }
+
+    /// Returns the port that is selected; `None` for a point.
+    pub fn port(&self) -> Option<u8> {
+        match self.selected()? {
+            Row::Port(port) => Some(port.number),
+            Row::Point(_) => None,
+        }
+    }
+
     /// Returns the row that is selected.
     pub fn selected(&self) -> Option<Row<'_>> {
         self.rows().get(self.selected).copied()

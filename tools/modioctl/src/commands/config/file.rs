@@ -5,7 +5,7 @@ use std::fmt::Write;
 use std::ops::Range;
 use std::path::Path;
 
-use modio_description::{Description, Unit};
+use modio_description::{Description, Unit, Value};
 use register_map::codes::{Format, Mode};
 use register_map::configuration::{FORMAT, MODE, module_of};
 use toml::de::{DeTable, DeValue};
@@ -28,12 +28,8 @@ pub fn text(book: &Book, items: &[Item], values: &[Vec<u16>]) -> Result<String, 
             serde_json::Value::String(name) => toml::Value::String(name.clone()).to_string(),
             _ => shown.text.clone(),
         };
-        let _ = writeln!(
-            text,
-            "{} = {value}  # {}",
-            item.name,
-            comment(item, &shown.unit)
-        );
+        let comment = comment(item, &shown.unit);
+        let _ = writeln!(text, "{} = {value}  # {comment}", item.name);
     }
     Ok(text)
 }
@@ -44,16 +40,9 @@ fn comment(item: &Item, unit: &str) -> String {
         .trim_start_matches("By point. ")
         .trim_start_matches("By port. ");
     let takes = match (&item.meaning, &item.values) {
-        (Meaning::Value(modio_description::Value::Number(of)), Some(values)) => takes(values, of),
-        (_, Some(values))
-            if unit.is_empty()
-                && !matches!(
-                    item.meaning,
-                    Meaning::Value(modio_description::Value::Codes(_))
-                ) =>
-        {
-            takes(values, &Unit::default())
-        }
+        (Meaning::Value(Value::Number(of)), Some(values)) => takes(values, of),
+        (Meaning::Value(Value::Codes(_)), _) => String::new(),
+        (_, Some(values)) if unit.is_empty() => takes(values, &Unit::default()),
         _ => String::new(),
     };
     let takes = takes.trim_start_matches("it takes ");

@@ -75,11 +75,9 @@ pub async fn run(
             let rows = differences(&mut device, &book, &wanted).await?;
             table(rows.clone(), "the file")?;
             let is_changed = |item: &Item| rows.iter().any(|[name, ..]| *name == item.name);
-            let modules = wanted.iter().filter(|(item, _)| is_module(item));
-            let modules: Vec<_> = modules
-                .filter(|(item, _)| is_changed(item))
-                .map(|(item, _)| item.name.as_str())
-                .collect();
+            let modules = wanted.iter().map(|(item, _)| item);
+            let modules = modules.filter(|item| is_module(item) && is_changed(item));
+            let modules: Vec<_> = modules.map(|item| item.name.as_str()).collect();
             if !modules.is_empty() && !yes {
                 agree(&modules.join(", ")).await?;
             }
@@ -207,11 +205,9 @@ async fn differences(
             .find(|(known, _)| known.address == item.address);
         let now = now.map(|(_, words)| words);
         if now != Some(words) {
-            let now = now.map_or_else(
-                || "missing".to_owned(),
-                |words| show(item, words, false).to_string(),
-            );
-            rows.push([item.name.clone(), now, show(item, words, false).to_string()]);
+            let shown = |words: &Vec<u16>| show(item, words, false).to_string();
+            let now = now.map_or_else(|| "missing".to_owned(), shown);
+            rows.push([item.name.clone(), now, shown(words)]);
         }
     }
     Ok(rows)
@@ -257,24 +253,18 @@ async fn import(
     progress: &mut Progress<'_>,
 ) -> Result<(), Failure> {
     device.unlock().await?;
-    let modules: Vec<_> = wanted
-        .iter()
-        .filter(|(item, _)| is_module(item))
-        .cloned()
-        .collect();
-    let modules = differing(device, &modules).await?;
+    let modules = wanted.iter().filter(|(item, _)| is_module(item));
+    let modules = differing(device, &modules.cloned().collect::<Vec<_>>()).await?;
     progress.write(device, &modules).await?;
     let mut changes = differing(device, wanted).await?;
     // FORMAT and MODE must be compatible, so write both or none.
     let line = configuration::FORMAT..=configuration::MODE;
     if changes.iter().any(|(item, _)| line.contains(&item.address)) {
         changes.retain(|(item, _)| !line.contains(&item.address));
-        changes.extend(
-            wanted
-                .iter()
-                .filter(|(item, _)| line.contains(&item.address))
-                .cloned(),
-        );
+        let both = wanted
+            .iter()
+            .filter(|(item, _)| line.contains(&item.address));
+        changes.extend(both.cloned());
     }
     progress.all = progress.done + changes.len();
     progress.write(device, &changes).await?;
@@ -305,10 +295,8 @@ async fn differing(device: &mut Device, wanted: &[Setting]) -> Result<Vec<Settin
     let items: Vec<_> = wanted.iter().map(|(item, _)| item.clone()).collect();
     let now = device.read_items(&items).await?;
     let both = wanted.iter().zip(now);
-    Ok(both
-        .filter(|((_, words), now)| words != now)
-        .map(|(change, _)| change.clone())
-        .collect())
+    let differing = both.filter(|((_, words), now)| words != now);
+    Ok(differing.map(|(change, _)| change.clone()).collect())
 }
 
 /// Restarts the unit if that is wanted and needed. Prints a note if it is needed but not wanted.
