@@ -26,13 +26,10 @@ const STALE: usize = 16 * 1024;
 const SENDING: Duration = Duration::from_secs(2);
 
 /// Reads one register. The response never equals the request, so this shows whether an adapter returns what it sends.
-const PROBE: [u8; 5] = [
-    3,
-    (PRODUCT_CODE >> 8) as u8,
-    (PRODUCT_CODE & 0xFF) as u8,
-    0,
-    1,
-];
+const PROBE: [u8; 5] = {
+    let [high, low] = PRODUCT_CODE.to_be_bytes();
+    [3, high, low, 0, 1]
+};
 
 /// Number of bytes in front of a returned request that are tolerated, as in front of an answer.
 const NOISE: usize = 3;
@@ -250,14 +247,11 @@ impl Master {
         let mut until = last;
         loop {
             let never_silent = junk.len() + got.len() >= MOST || Instant::now() >= end;
-            let until_now = until.min(end);
-            if !never_silent
-                && self
-                    .read_until(until_now, &mut got)
-                    .await
-                    .map_err(Lost::Broken)?
-                    > 0
-            {
+            let read = match never_silent {
+                true => Ok(0),
+                false => self.read_until(until.min(end), &mut got).await,
+            };
+            if read.map_err(Lost::Broken)? > 0 {
                 returned = returned || self.drop_echo(&own, &mut got);
                 // A busy computer delivers an answer, or an echo, in pieces with a pause between them.
                 let mut all = [junk.as_slice(), &got].concat();

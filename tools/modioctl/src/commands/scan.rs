@@ -81,10 +81,9 @@ pub async fn run(
         )),
         (true, true) => Err(Failure::NoAnswer(format!(
             "no unit found{}: check power, wiring (A and B swapped?) and rate (`--rates all`); a unit's address is its DIP switch; a unit with a long RESPONSE_DELAY or over the air needs a longer `--timeout`",
-            if scanned.echo {
-                ", and the adapter returns what it sends, which is not an answer"
-            } else {
-                ""
+            match scanned.echo {
+                true => ", and the adapter returns what it sends, which is not an answer",
+                false => "",
             }
         ))),
     }
@@ -205,11 +204,8 @@ async fn sweep(
         return Ok(());
     }
     bar.inc_length(silent.len() as u64);
-    bar.set_message(
-        format!("{line} silent addresses, {LONG:?} each")
-            .trim()
-            .to_owned(),
-    );
+    let message = format!("{line} silent addresses, {LONG:?} each");
+    bar.set_message(message.trim().to_owned());
     let sweep = master.sweep(&silent, LONG, found, asked);
     sweep.await.map_err(lost)
 }
@@ -283,21 +279,17 @@ async fn look_at(device: &mut Device) -> Result<Unit, Failure> {
         Err(reason) => format!("no identification: {reason}"),
     };
     let description = answered(known(device).await)?;
-    let modules = match description {
-        None => String::new(),
-        Some(description) => {
-            let ports = description.ports.iter().map(|port| {
-                let name = module_name(&description, port.module);
-                format!("p{} {name}", port.number)
-            });
-            ports.collect::<Vec<_>>().join(", ")
-        }
-    };
+    let mut modules = Vec::new();
+    if let Some(unit) = &description {
+        let ports = unit.ports.iter();
+        let named = ports.map(|port| (port.number, module_name(unit, port.module)));
+        modules.extend(named.map(|(port, name)| format!("p{port} {name}")));
+    }
     Ok(Unit {
         address: device.unit,
         line: device.master.endpoint().clone(),
         identity,
-        modules,
+        modules: modules.join(", "),
     })
 }
 
@@ -328,12 +320,8 @@ fn print(scanned: &Scanned, serial: bool, json: bool) -> Result<(), Failure> {
                 (true, Framing::Ascii) => format!("{baud} {format} ASCII"),
                 (true, _) => format!("{baud} {format}"),
             };
-            [
-                unit.address.to_string(),
-                line,
-                unit.identity.clone(),
-                unit.modules.clone(),
-            ]
+            let (identity, modules) = (unit.identity.clone(), unit.modules.clone());
+            [unit.address.to_string(), line, identity, modules]
         })
         .collect();
     if !rows.is_empty() {
@@ -343,9 +331,8 @@ fn print(scanned: &Scanned, serial: bool, json: bool) -> Result<(), Failure> {
         output::line(format_args!("the line is never silent at {at}"))?;
     }
     for at in garbled {
-        output::line(format_args!(
-            "something answers, but garbled, at address {at}"
-        ))?;
+        let what = "something answers, but garbled, at address";
+        output::line(format_args!("{what} {at}"))?;
     }
     Ok(())
 }

@@ -162,16 +162,13 @@ fn words(framing: Framing, piece: &Piece) -> String {
 
 /// Returns a piece as a line: time in s, gap in ms, direction, bytes, words, turnaround in ms.
 fn line(framing: Framing, piece: &Piece, gap: Option<Duration>) -> String {
-    let gap = gap.map_or_else(
-        || "-".to_owned(),
-        |gap| format!("+{:.1}", milliseconds(gap)),
-    );
+    let gap = gap.map(|gap| format!("+{:.1}", milliseconds(gap)));
+    let gap = gap.unwrap_or_else(|| "-".to_owned());
     let text = match &piece.kind {
-        Kind::Garbled => format!(
-            "?? {}  {}",
-            adu::bytes(Framing::Rtu, &piece.bytes),
-            words(framing, piece)
-        ),
+        Kind::Garbled => {
+            let bytes = adu::bytes(Framing::Rtu, &piece.bytes);
+            format!("?? {bytes}  {}", words(framing, piece))
+        }
         Kind::Frame {
             direction, request, ..
         } => {

@@ -160,11 +160,11 @@ impl Poller {
             return Ok(Round::Changed);
         }
         self.waiting.extend(plan.waiting_for_restart(&words));
-        for port in &plan.ports {
-            if self.waiting.contains(&port.number) {
-                for point in port.points.iter().filter(|point| is_analog(point)) {
-                    words.remove(&point.name);
-                }
+        let ports = plan.ports.iter();
+        let waiting = ports.filter(|port| self.waiting.contains(&port.number));
+        for point in waiting.flat_map(|port| &port.points) {
+            if is_analog(point) {
+                words.remove(&point.name);
             }
         }
         let counted = self.counted.map(|counted| counted.elapsed());
