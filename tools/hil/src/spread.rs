@@ -32,10 +32,7 @@ impl Spread {
 
     /// Returns a line for each step from the minimum to the 99th percentile, and one line for longer times.
     pub fn histogram(&self) -> String {
-        let (first, top) = (
-            self.percentile(0).as_micros(),
-            self.percentile(99).as_micros(),
-        );
+        let [first, top] = [0, 99].map(|percent| self.percentile(percent).as_micros());
         let step = round_up((top - first) / LINES + 1);
         let begin = first / step * step;
         let end = top / step * step + step;
@@ -110,25 +107,15 @@ mod tests {
         let mut times: Vec<u64> = (0..999).map(|n| 4000 + n % 100).collect();
         times.push(900_000);
         let text = spread(times).histogram();
-        let counts: Vec<usize> = text
-            .lines()
-            .map(|line| {
-                line.split_whitespace()
-                    .rev()
-                    .find_map(|w| w.parse().ok())
-                    .unwrap()
-            })
-            .collect();
-        assert_eq!(counts.iter().sum::<usize>(), 1000, "{text}");
+        let count = |line: &str| -> Option<usize> {
+            let mut words = line.split_whitespace().rev();
+            words.find_map(|word| word.parse().ok())
+        };
+        let counts: Option<usize> = text.lines().map(count).sum();
+        assert_eq!(counts, Some(1000), "{text}");
         assert!(text.lines().count() <= LINES as usize + 2, "{text}");
-        assert!(
-            text.trim_end()
-                .lines()
-                .last()
-                .unwrap()
-                .starts_with("  above"),
-            "{text}"
-        );
+        let last = text.lines().last().unwrap();
+        assert!(last.starts_with("  above"), "{text}");
     }
 
     #[test]

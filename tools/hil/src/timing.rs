@@ -80,22 +80,16 @@ pub fn measure(bench: &mut Bench<'_>, requests: u32, stop: &AtomicBool) -> Check
         let begin = bench.endpoint.now();
         let reply = bench.exchange_until(&[Piece::Bytes(frame)], length)?;
         tally.sent += 1;
-        lost_in_a_row = if reply == Reply::Silence {
-            lost_in_a_row + 1
-        } else {
-            0
-        };
+        let lost = reply == Reply::Silence;
+        lost_in_a_row = if lost { lost_in_a_row + 1 } else { 0 };
         if reply == Reply::Pdu(request) {
             if let Some(last) = bench.received.last() {
                 let whole = begin + line.characters(2 * length);
                 times.push(bench.exact(bench.turnaround(), last.end.saturating_sub(whole)));
             }
         } else {
-            if reply == Reply::Silence {
-                tally.lost += 1;
-            } else {
-                tally.wrong += 1;
-            }
+            tally.lost += u32::from(lost);
+            tally.wrong += u32::from(!lost);
             if let (None, Err(conformance::case::Stop::Fail(failure))) =
                 (&tally.example, bench.fail::<()>("the request, echoed"))
             {
