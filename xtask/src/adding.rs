@@ -12,7 +12,6 @@ use crate::build;
 use crate::command;
 use crate::workspace::{ALL, SUITE, Workspace};
 
-/// The patch that adds the module.
 const PATCH: &str = "docs/adding-a-module.patch";
 
 /// The packages with files in the patch.

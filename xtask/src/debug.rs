@@ -137,7 +137,6 @@ fn check_list(list: io::Result<Output>) -> Result<()> {
 }
 
 impl Options {
-    /// Returns a command of probe-rs with the options for the probe.
     fn probe_rs(&self, subcommand: &str) -> Command {
         let part = self.given.board().memory().part.name;
         let mut command = Command::new("probe-rs");

@@ -15,7 +15,6 @@ use crate::workspace::Workspace;
 /// The manifest of the fuzz targets, a separate workspace.
 pub const MANIFEST: &str = "fuzz/Cargo.toml";
 
-/// Time for each target in CI, in seconds.
 const SECONDS_IN_CI: u32 = 15;
 
 /// Longest input, in bytes; longest time for one input, in seconds; most memory, in MiB. No line for each new input,
@@ -69,7 +68,6 @@ pub fn check(workspace: &mut Workspace) -> Result<()> {
     session(workspace, &targets(workspace)?, SECONDS_IN_CI)
 }
 
-/// Returns the names of all targets.
 fn targets(workspace: &Workspace) -> Result<Vec<String>> {
     let Ok(names) = command::read(workspace.cargo("fuzz").arg("list")) else {
         let advice = "cargo-fuzz is not installed: cargo install --locked cargo-fuzz";

@@ -87,7 +87,6 @@ pub fn check(workspace: &mut Workspace) -> Result<()> {
     Ok(())
 }
 
-/// The programs of a test.
 struct Programs<'a> {
     workspace: &'a Workspace,
     /// Joins two pseudo-terminals.
@@ -203,7 +202,6 @@ fn row(name: &str, version: &str, report: &Value) -> String {
     format!("| {name} | {version} | {passed} | {failed} | {skipped} | {groups} |\n")
 }
 
-/// Returns the document with the table replaced.
 fn replaced(document: &str, table: &str) -> Option<String> {
     let (before, rest) = document.split_once(BEGIN)?;
     let (_, after) = rest.split_once(END)?;

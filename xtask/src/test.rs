@@ -30,7 +30,6 @@ const PROGRAMS: [(&str, &str); 2] = [
     ("loader", "loader board-support register-map"),
 ];
 
-/// The workspaces of this project.
 const WORKSPACES: [&str; 3] = ["Cargo.toml", fuzz::MANIFEST, peers::MANIFEST];
 
 /// The tests of the images that run at the corners: those whose result depends on the clocks, on the time of

@@ -9,7 +9,7 @@ use crate::frame::{Reply, hex};
 use crate::target::Target;
 
 /// Waiting times.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Patience {
     /// Time to wait for the first character of a reply that is due.
     pub reply: Duration,
@@ -31,10 +31,8 @@ pub struct Bench<'a> {
     pub endpoint: &'a mut dyn Endpoint,
     /// The unit.
     pub target: &'a Target,
-    /// How long to wait.
+    /// How long to wait; a case may change it.
     pub patience: Patience,
-    /// Whether a modio's configuration may be written.
-    pub allow_config: bool,
     /// Number of due replies that were missing, so that the request was repeated.
     pub asked_again: u32,
     /// The last request and the reply, for people.
@@ -48,17 +46,11 @@ pub struct Bench<'a> {
 
 impl<'a> Bench<'a> {
     /// Returns the tools for this line and unit.
-    pub fn new(
-        endpoint: &'a mut dyn Endpoint,
-        target: &'a Target,
-        patience: Patience,
-        allow_config: bool,
-    ) -> Self {
+    pub fn new(endpoint: &'a mut dyn Endpoint, target: &'a Target) -> Self {
         Self {
             endpoint,
             target,
-            patience,
-            allow_config,
+            patience: target.patience,
             asked_again: 0,
             sent: String::new(),
             came: String::new(),
@@ -68,19 +60,25 @@ impl<'a> Bench<'a> {
     }
 
     /// Returns the unit's address.
-    #[must_use]
     pub fn unit(&self) -> u8 {
         self.target.unit
     }
 
     /// Another unit's address, an ordinary one.
-    #[must_use]
     pub fn other(&self) -> u8 {
         if self.target.unit == 42 { 43 } else { 42 }
     }
 
+    /// Returns one of two values: the first where the endpoint's time is exact.
+    pub fn exact<T>(&self, exact: T, otherwise: T) -> T {
+        if self.endpoint.abilities().exact {
+            exact
+        } else {
+            otherwise
+        }
+    }
+
     /// Returns the frame of a request to this unit.
-    #[must_use]
     pub fn frame(&self, pdu: &[u8]) -> Vec<u8> {
         self.target.mode.frame(self.target.unit, pdu)
     }
@@ -133,11 +131,9 @@ impl<'a> Bench<'a> {
         // An operating system may deliver a frame in parts: wait for the rest of a part.
         let whole = |bytes: &[u8]| bytes.is_empty() || self.target.mode.decode(bytes).is_ok();
         while !self.endpoint.abilities().exact && bytes.len() < enough && !whole(&bytes) {
-            let more = self.endpoint.receive(
-                self.patience.quiet * 5,
-                self.patience.quiet,
-                enough - bytes.len(),
-            )?;
+            let quiet = self.patience.quiet;
+            let missing = enough - bytes.len();
+            let more = self.endpoint.receive(quiet * 5, quiet, missing)?;
             if more.is_empty() {
                 break;
             }
@@ -196,11 +192,8 @@ impl<'a> Bench<'a> {
 
     /// Sends a PDU and expects exactly this PDU in reply.
     pub fn reply_is(&mut self, pdu: &[u8], wanted: &[u8]) -> Check {
-        let reply = self.ask_due(pdu)?;
-        self.ensure(
-            reply == Reply::Pdu(wanted.to_vec()),
-            format!("the PDU {}", hex(wanted)),
-        )
+        let right = self.ask_due(pdu)? == Reply::Pdu(wanted.to_vec());
+        self.ensure(right, format!("the PDU {}", hex(wanted)))
     }
 
     /// Sends a PDU and expects this exception.
@@ -225,10 +218,8 @@ impl<'a> Bench<'a> {
     pub fn exception_03_or_silence(&mut self, pdu: &[u8]) -> Check {
         let reply = self.ask(pdu)?;
         let right = reply == Reply::Silence || reply.exception(pdu[0]) == Some(3);
-        self.ensure(
-            right,
-            format!("exception 03 to function {:02X}, or silence", pdu[0]),
-        )
+        let wanted = format!("exception 03 to function {:02X}, or silence", pdu[0]);
+        self.ensure(right, wanted)
     }
 
     /// Sends every beginning of a PDU that is shorter than the PDU, and the PDU with some bytes added. Each must get
@@ -257,6 +248,17 @@ impl<'a> Bench<'a> {
         self.silence(&[Piece::Bytes(bytes.to_vec())], why)
     }
 
+    /// Sends a PDU in a good frame to a unit, or to all units, and expects silence.
+    pub fn silence_of(&mut self, unit: u8, pdu: &[u8], why: impl Display) -> Check {
+        let frame = self.target.mode.frame(unit, pdu);
+        self.silence_to(&frame, why)
+    }
+
+    /// Sends the request of [`Bench::alive`] to another unit, or to all units, and expects silence.
+    pub fn silent_ping(&mut self, unit: u8, why: impl Display) -> Check {
+        self.silence_of(unit, &self.target.ping, why)
+    }
+
     /// Sends an ordinary request, which the unit must answer.
     pub fn alive(&mut self, after: impl Display) -> Check {
         let ping = self.target.ping.clone();
@@ -277,13 +279,11 @@ impl<'a> Bench<'a> {
     }
 
     /// Returns the frame of the request of [`Bench::alive`].
-    #[must_use]
     pub fn ping(&self) -> Vec<u8> {
         self.frame(&self.target.ping)
     }
 
     /// Returns whether a reply is right for the request of [`Bench::alive`].
-    #[must_use]
     pub fn is_pong(&self, reply: &Reply) -> bool {
         matches!(reply, Reply::Pdu(pdu) if pdu[0] == self.target.ping[0])
     }
@@ -300,6 +300,13 @@ impl<'a> Bench<'a> {
         }
     }
 
+    /// Returns the time from the end of the last request to the first start bit of the reply.
+    pub fn turnaround(&self) -> Duration {
+        let first = self.received.first();
+        let start = first.map_or(Duration::ZERO, |first| first.start);
+        start.saturating_sub(self.sent_end)
+    }
+
     /// Lets time pass.
     pub fn rest(&mut self, time: Duration) -> Result<(), Broken> {
         self.endpoint.rest(time)
@@ -307,7 +314,6 @@ impl<'a> Bench<'a> {
 }
 
 /// Returns two runs of bytes with a gap between them.
-#[must_use]
 pub fn apart(first: &[u8], gap: Duration, second: &[u8]) -> [Piece; 3] {
     [
         Piece::Bytes(first.to_vec()),
@@ -317,7 +323,6 @@ pub fn apart(first: &[u8], gap: Duration, second: &[u8]) -> [Piece; 3] {
 }
 
 /// Returns a frame in which the character at `index` is damaged in this way.
-#[must_use]
 pub fn damaged_at(frame: &[u8], index: usize, damage: fn(u8) -> Piece) -> [Piece; 3] {
     [
         Piece::Bytes(frame[..index].to_vec()),

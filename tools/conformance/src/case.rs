@@ -56,7 +56,6 @@ pub enum Kind {
 
 impl Kind {
     /// Returns the name in lists and reports.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Standard => "standard",
@@ -85,7 +84,6 @@ pub struct Case {
 
 impl Case {
     /// Returns the same case as an interpretation of the standards.
-    #[must_use]
     pub const fn interpretation(mut self) -> Self {
         self.kind = Kind::Interpretation;
         self
@@ -94,7 +92,6 @@ impl Case {
 
 /// Returns a case. Its kind is [`Kind::Modio`] when it needs a modio or cites the register map, and
 /// [`Kind::Standard`] otherwise.
-#[must_use]
 pub const fn case(
     name: &'static str,
     section: &'static str,

@@ -135,16 +135,11 @@ fn setting(text: &str) -> Result<(u16, u16), String> {
 
 impl Cli {
     /// Returns the line's rate and format.
-    #[must_use]
     pub fn line(&self) -> LineFormat {
         LineFormat::new(self.baud, self.format)
     }
 
     /// Returns the transmission mode, by the option or the profile.
-    ///
-    /// # Errors
-    ///
-    /// When the profile is wrong.
     pub fn mode(&self, profile: Option<&Profile>) -> Result<Mode> {
         if self.ascii {
             return Ok(Mode::Ascii);
@@ -154,7 +149,6 @@ impl Cli {
     }
 
     /// Returns the unit's address.
-    #[must_use]
     pub fn unit(&self, profile: Option<&Profile>) -> u8 {
         let unit = self.unit.or_else(|| profile.and_then(|p| p.unit));
         #[cfg(feature = "sim")]
@@ -163,10 +157,6 @@ impl Cli {
     }
 
     /// Returns the profile, if one is given.
-    ///
-    /// # Errors
-    ///
-    /// When the profile cannot be read or is wrong.
     pub fn read_profile(&self) -> Result<Option<Profile>> {
         let Some(path) = &self.profile else {
             return Ok(None);
@@ -180,10 +170,6 @@ impl Cli {
     }
 
     /// Opens the endpoint.
-    ///
-    /// # Errors
-    ///
-    /// When no endpoint is named, or when it cannot be opened.
     pub fn open(&self, mode: Mode) -> Result<Box<dyn Endpoint>> {
         ensure!(
             self.format.data_bits != 7 || mode == Mode::Ascii,
@@ -223,16 +209,11 @@ impl Cli {
     }
 
     /// Returns the waiting times on this endpoint.
-    #[must_use]
     pub fn waits(&self, endpoint: &dyn Endpoint) -> Patience {
         waits(endpoint, self.patience.map(Duration::from_millis))
     }
 
     /// Returns the cases to run.
-    ///
-    /// # Errors
-    ///
-    /// When no case is left.
     pub fn cases(&self) -> Result<Vec<Case>> {
         let mut cases = chosen(&self.only)?;
         cases.retain(|case| {
@@ -248,10 +229,6 @@ impl Cli {
 }
 
 /// Returns the cases whose names contain one of these parts; all when there is none.
-///
-/// # Errors
-///
-/// When no case is left.
 pub fn chosen(parts: &[String]) -> Result<Vec<Case>> {
     let mut cases = crate::cases::all();
     if !parts.is_empty() {
@@ -266,7 +243,6 @@ pub fn chosen(parts: &[String]) -> Result<Vec<Case>> {
 
 /// Returns the waiting times on an endpoint. Where time is exact, the line sets them. Elsewhere they allow for a slow
 /// operating system, and for a simulator that is slower than its clock.
-#[must_use]
 pub fn waits(endpoint: &dyn Endpoint, reply: Option<Duration>) -> Patience {
     let line = endpoint.line();
     if endpoint.abilities().exact {
@@ -278,9 +254,8 @@ pub fn waits(endpoint: &dyn Endpoint, reply: Option<Duration>) -> Patience {
             quiet: line.t35() + line.characters(1),
         }
     } else {
-        let wait = reply
-            .unwrap_or(Duration::from_millis(250))
-            .max(line.t35() * 3);
+        let reply = reply.unwrap_or(Duration::from_millis(250));
+        let wait = reply.max(line.t35() * 3);
         Patience {
             // A reply ends the wait, so a long wait costs time only when no reply is received.
             reply: wait * 4,
@@ -295,8 +270,8 @@ mod tests {
     use super::*;
     use clap::CommandFactory;
 
-    fn parse(arguments: &[&str]) -> Cli {
-        Cli::try_parse_from(std::iter::once(&"x").chain(arguments)).unwrap()
+    fn parse(arguments: &str) -> Cli {
+        Cli::try_parse_from(format!("x {arguments}").split_whitespace()).unwrap()
     }
 
     #[test]
@@ -309,35 +284,24 @@ mod tests {
 
     #[test]
     fn missing_endpoint_is_an_error_that_names_the_options() {
-        let text = parse(&[]).open(Mode::Rtu).err().unwrap().to_string();
-        assert!(
-            text.contains("--serial") && text.contains("--tcp"),
-            "{text}"
-        );
-        let wrong = parse(&["--format", "7E1"]).open(Mode::Rtu).err().unwrap();
+        let text = parse("").open(Mode::Rtu).err().unwrap().to_string();
+        let both = text.contains("--serial") && text.contains("--tcp");
+        assert!(both, "{text}");
+        let wrong = parse("--format 7E1").open(Mode::Rtu).err().unwrap();
         assert!(wrong.to_string().contains("--ascii"), "{wrong}");
     }
 
     #[test]
     fn cases_are_chosen_by_parts_of_their_names() {
-        let all = parse(&[]).cases().unwrap().len();
-        let some = parse(&["--only", "fc05/", "--only", "ascii/"])
-            .cases()
-            .unwrap();
+        let all = parse("").cases().unwrap().len();
+        let some = parse("--only fc05/ --only ascii/").cases().unwrap();
         assert!(some.len() > 10 && some.len() < all);
-        assert!(parse(&["--only", "no such case"]).cases().is_err());
-        let fewer = parse(&[
-            "--only",
-            "fc05/",
-            "--exclude",
-            "length",
-            "--exclude",
-            "value",
-        ]);
+        assert!(parse("--only no-such-case").cases().is_err());
+        let fewer = parse("--only fc05/ --exclude length --exclude value");
         let names: Vec<_> = fewer.cases().unwrap().iter().map(|c| c.name).collect();
         assert_eq!(names, ["fc05/on-and-off", "fc05/address"]);
-        assert!(parse(&["--exclude", "/"]).cases().is_err());
-        let standard = parse(&["--standard-only", "--only", "fc05/", "--only", "config/"]);
+        assert!(parse("--exclude /").cases().is_err());
+        let standard = parse("--standard-only --only fc05/ --only config/");
         let names: Vec<_> = standard.cases().unwrap().iter().map(|c| c.name).collect();
         assert!(names.contains(&"fc05/value") && !names.contains(&"fc05/length"));
         assert!(names.iter().all(|name| name.starts_with("fc05/")));
@@ -345,10 +309,10 @@ mod tests {
 
     #[test]
     fn unit_is_that_of_the_option_then_of_the_profile_then_1() {
-        assert_eq!(parse(&[]).unit(None), 1);
-        assert_eq!(parse(&["--unit", "9"]).unit(None), 9);
+        assert_eq!(parse("").unit(None), 1);
+        assert_eq!(parse("--unit 9").unit(None), 9);
         let profile = Profile::parse("unit = 17").unwrap();
-        assert_eq!(parse(&[]).unit(Some(&profile)), 17);
-        assert_eq!(parse(&["--unit", "9"]).unit(Some(&profile)), 9);
+        assert_eq!(parse("").unit(Some(&profile)), 17);
+        assert_eq!(parse("--unit 9").unit(Some(&profile)), 9);
     }
 }

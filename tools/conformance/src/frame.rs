@@ -25,16 +25,11 @@ impl Mode {
     }
 
     /// Returns the bytes of a frame with this unit address and PDU.
-    #[must_use]
     pub fn frame(self, unit: u8, pdu: &[u8]) -> Vec<u8> {
         self.framing().frame(0, unit, pdu)
     }
 
-    /// Returns the unit address and the PDU of a frame.
-    ///
-    /// # Errors
-    ///
-    /// What is wrong with the frame, for people.
+    /// Returns the unit address and the PDU of a frame. The error says what is wrong with the frame.
     pub fn decode(self, frame: &[u8]) -> Result<(u8, Vec<u8>), String> {
         // V1.02, 2.5.2 names the digits "0-9, A-F".
         if self == Self::Ascii && frame.iter().any(u8::is_ascii_lowercase) {
@@ -45,13 +40,11 @@ impl Mode {
 }
 
 /// Returns these bytes and their CRC.
-#[must_use]
 pub fn rtu(body: &[u8]) -> Vec<u8> {
     [body, &crc(body)].concat()
 }
 
 /// Returns these bytes in ASCII framing with a check byte, right or not.
-#[must_use]
 pub fn ascii(body: &[u8], check: u8) -> Vec<u8> {
     let digits = body.iter().chain([&check]);
     let digits: String = digits.map(|byte| format!("{byte:02X}")).collect();
@@ -59,7 +52,6 @@ pub fn ascii(body: &[u8], check: u8) -> Vec<u8> {
 }
 
 /// Returns bytes for people, such as `01 03 00 10`; long runs are cut in the middle.
-#[must_use]
 pub fn hex(run: &[u8]) -> String {
     const ENDS: usize = 24;
     let join = |run: &[u8]| bytes(Framing::Rtu, run);
@@ -84,7 +76,6 @@ pub enum Reply {
 
 impl Reply {
     /// Returns the exception code, if this is an exception reply to `function`.
-    #[must_use]
     pub fn exception(&self, function: u8) -> Option<u8> {
         match self {
             Self::Pdu(pdu) => match pdu[..] {

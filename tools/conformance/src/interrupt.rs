@@ -11,10 +11,6 @@ pub const STATUS: u8 = 130;
 static ASKED: AtomicBool = AtomicBool::new(false);
 
 /// Catches these signals from now on. Returns the flag that they set.
-///
-/// # Errors
-///
-/// When the handler cannot be installed.
 pub fn catch() -> Result<&'static AtomicBool> {
     ctrlc::set_handler(|| {
         if ASKED.swap(true, Ordering::Relaxed) {

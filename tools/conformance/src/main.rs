@@ -8,7 +8,7 @@ use conformance::cli::Cli;
 use conformance::endpoint::trace::Trace;
 use conformance::probe::{Given, probe};
 use conformance::report::{Totals, json, junit, table};
-use conformance::run::{self, Options};
+use conformance::run;
 use conformance::target::{Support, Target};
 use conformance::{interrupt, program};
 
@@ -37,13 +37,9 @@ fn test(cli: &Cli) -> anyhow::Result<u8> {
         profile: profile.as_ref(),
         allow_config: cli.allow_config,
     };
-    let (target, patience) = probe(endpoint.as_mut(), &given)?;
+    let target = probe(endpoint.as_mut(), &given)?;
     let name = endpoint.name();
     program::say(format_args!("{name}: {}", found(&target)));
-    let options = Options {
-        patience,
-        allow_config: cli.allow_config,
-    };
     let mut outcomes = Vec::new();
     let report = |outcome: &run::Outcome| program::say(table::row(outcome));
     let stop = interrupt::catch()?;
@@ -51,7 +47,6 @@ fn test(cli: &Cli) -> anyhow::Result<u8> {
     let ended = run::run_while(
         endpoint.as_mut(),
         &target,
-        options,
         &cases,
         go_on,
         report,

@@ -1,35 +1,20 @@
 //! Reads, writes and restores the unit's points for a case, by the functions that the unit has.
 
+use std::fmt::Display;
+
+pub use modbus_line::adu::{pdu, words_of, write_words};
 use register_map::configuration::{KEY, OPENING_KEY};
 
 use crate::bench::Bench;
 use crate::case::{Check, Stop};
 use crate::target::{Span, Words};
 
-/// Returns a request's function, address and one more word.
-#[must_use]
-pub fn pdu(function: u8, address: u16, word: u16) -> Vec<u8> {
-    let ([ah, al], [wh, wl]) = (address.to_be_bytes(), word.to_be_bytes());
-    vec![function, ah, al, wh, wl]
-}
-
 /// Returns a request of function 08.
-#[must_use]
 pub fn diagnose(sub: u16, data: &[u8]) -> Vec<u8> {
     [&[8], &sub.to_be_bytes()[..], data].concat()
 }
 
-/// Returns a write of several registers, 0x10.
-#[must_use]
-pub fn write_words(address: u16, values: &[u16]) -> Vec<u8> {
-    let mut request = pdu(0x10, address, values.len() as u16);
-    request.push((values.len() * 2) as u8);
-    request.extend(values.iter().flat_map(|value| value.to_be_bytes()));
-    request
-}
-
 /// Returns a write of several coils, 0x0F; the padding bits of the last byte are `padding`.
-#[must_use]
 pub fn write_bits(address: u16, values: &[bool], padding: bool) -> Vec<u8> {
     let mut request = pdu(0x0F, address, values.len() as u16);
     request.push(values.len().div_ceil(8) as u8);
@@ -40,13 +25,6 @@ pub fn write_bits(address: u16, values: &[bool], padding: bool) -> Vec<u8> {
         })
     }));
     request
-}
-
-/// Returns the words of a reply to 03, 04 or 17.
-#[must_use]
-pub fn words_of(reply: &[u8]) -> Vec<u16> {
-    let (pairs, _) = reply.get(2..).unwrap_or_default().as_chunks::<2>();
-    pairs.iter().map(|pair| u16::from_be_bytes(*pair)).collect()
 }
 
 /// The values of the points that cases write to, before a case.
@@ -89,7 +67,6 @@ impl Bench<'_> {
 
     /// Returns the addresses next to what a function (1 to 4) reads, and 0xFFFF, as far as the function cannot read
     /// them.
-    #[must_use]
     pub fn outside(&self, function: u8) -> Vec<u16> {
         let spans = self.target.readable(function);
         let mut outside = vec![0xFFFF];
@@ -101,11 +78,22 @@ impl Bench<'_> {
         outside
     }
 
+    /// Checks the values of registers. `wanted` describes them.
+    pub fn words_are(&mut self, span: Span, values: &[u16], wanted: impl Display) -> Check {
+        let now = self.read_words(span)?;
+        self.ensure(now == values, wanted)
+    }
+
     /// Checks that a register still has this value.
     pub fn word_is(&mut self, address: u16, value: u16) -> Check {
-        let now = self.read_word(address)?;
         let wanted = format!("register {address:04X} still is {value:04X}");
-        self.ensure(now == value, wanted)
+        self.words_are(Span::one(address), &[value], wanted)
+    }
+
+    /// Checks the states of coils. `wanted` describes them.
+    pub fn bits_are(&mut self, span: Span, states: &[bool], wanted: impl Display) -> Check {
+        let now = self.read_bits(span)?;
+        self.ensure(now == states, wanted)
     }
 
     /// Checks that coils are still off.

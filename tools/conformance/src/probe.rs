@@ -38,15 +38,14 @@ pub const FUNCTIONS: [u8; 18] = [
     1, 2, 3, 4, 5, 6, 7, 8, 0x0B, 0x0C, 0x0F, 0x10, 0x11, 0x14, 0x15, 0x16, 0x17, 0x2B,
 ];
 
-/// Asks the unit. Returns what the unit has, and the waiting times with the unit's own delay.
-///
-/// # Errors
-///
-/// Why the unit cannot be tested, and what to do.
-pub fn probe(endpoint: &mut dyn Endpoint, given: &Given<'_>) -> Result<(Target, Patience)> {
+/// Asks the unit. Returns what the unit has, with waiting times that include the unit's own delay. The error says why
+/// the unit cannot be tested, and what to do.
+pub fn probe(endpoint: &mut dyn Endpoint, given: &Given<'_>) -> Result<Target> {
     let mut target = Target {
         unit: given.unit,
         mode: given.mode,
+        patience: given.patience,
+        allow_config: given.allow_config,
         functions: BTreeMap::new(),
         readable: Default::default(),
         bits: None,
@@ -55,14 +54,13 @@ pub fn probe(endpoint: &mut dyn Endpoint, given: &Given<'_>) -> Result<(Target, 
         modio: None,
         ping: vec![8, 0, 0, 0xA5, 0x37],
     };
-    let mut patience = given.patience;
     let line = endpoint.line();
     if let Some(profile) = given.profile {
         let known = profile.known()?;
         target.readable = known.readable;
         (target.bits, target.words) = (known.bits, known.words);
     } else {
-        let reply = first_answer(endpoint, &target, patience, &pdu(3, state::PRODUCT_CODE, 2))?;
+        let reply = first_answer(endpoint, &target, &pdu(3, state::PRODUCT_CODE, 2))?;
         let product = state::PRODUCT.to_be_bytes();
         let unit = given.unit;
         match reply {
@@ -77,11 +75,7 @@ pub fn probe(endpoint: &mut dyn Endpoint, given: &Given<'_>) -> Result<(Target, 
                 bail!("unit {unit} answers but is not a modio: describe it with --profile FILE")
             }
         }
-        let mut bench = Bench::new(endpoint, &target, patience, false);
-        let (found, slower) = modio(&mut bench, given.allow_config)?;
-        target = found;
-        patience.reply += slower;
-        patience.silence += slower;
+        target = modio(&mut Bench::new(endpoint, &target))?;
     }
     for function in FUNCTIONS {
         let listed = given.profile.and_then(|profile| profile.functions.as_ref());
@@ -90,7 +84,7 @@ pub fn probe(endpoint: &mut dyn Endpoint, given: &Given<'_>) -> Result<(Target, 
             Some(_) => Support::Refused,
             None => {
                 let request = harmless(&target, function)?;
-                match ask(endpoint, &target, patience, &request)? {
+                match ask(endpoint, &target, &request)? {
                     Reply::Silence => Support::Silent,
                     reply if reply.exception(function) == Some(1) => Support::Refused,
                     _ => Support::Yes,
@@ -102,39 +96,30 @@ pub fn probe(endpoint: &mut dyn Endpoint, given: &Given<'_>) -> Result<(Target, 
     target.ping = ping(&target).context(
         "no request is known that the unit answers: name something to read in the profile",
     )?;
-    let reply = ask(endpoint, &target, patience, &target.ping)?;
+    let reply = ask(endpoint, &target, &target.ping)?;
     ensure!(
         matches!(&reply, Reply::Pdu(pdu) if pdu[0] == target.ping[0]),
         "unit {} at {line} does not answer an ordinary request: the reply is {reply}",
         given.unit
     );
-    Ok((target, patience))
+    Ok(target)
 }
 
-fn ask(
-    endpoint: &mut dyn Endpoint,
-    target: &Target,
-    patience: Patience,
-    pdu: &[u8],
-) -> Check<Reply> {
-    Bench::new(endpoint, target, patience, false).ask_due(pdu)
+fn ask(endpoint: &mut dyn Endpoint, target: &Target, pdu: &[u8]) -> Check<Reply> {
+    Bench::new(endpoint, target).ask_due(pdu)
 }
 
 /// Asks a unit that may be starting, or may still have earlier bytes in its receiver.
-fn first_answer(
-    endpoint: &mut dyn Endpoint,
-    target: &Target,
-    patience: Patience,
-    pdu: &[u8],
-) -> Check<Reply> {
+fn first_answer(endpoint: &mut dyn Endpoint, target: &Target, pdu: &[u8]) -> Check<Reply> {
+    let silence = target.patience.silence;
     for _ in 0..ATTEMPTS - 1 {
-        if let reply @ Reply::Pdu(_) = ask(endpoint, target, patience, pdu)? {
+        if let reply @ Reply::Pdu(_) = ask(endpoint, target, pdu)? {
             return Ok(reply);
         }
         // Discard a late reply, so that it is not read as the reply to the next request.
-        endpoint.receive(patience.silence, patience.silence, usize::MAX)?;
+        endpoint.receive(silence, silence, usize::MAX)?;
     }
-    ask(endpoint, target, patience, pdu)
+    ask(endpoint, target, pdu)
 }
 
 /// Returns a request that shows whether the unit has a function, and changes nothing.
@@ -168,12 +153,9 @@ fn ping(target: &Target) -> Option<Vec<u8>> {
 }
 
 /// Reads from a modio's registers what the modio has, and how much longer than t3.5 its reply may take.
-fn modio(bench: &mut Bench<'_>, allow_config: bool) -> Check<(Target, Duration)> {
+fn modio(bench: &mut Bench<'_>) -> Check<Target> {
     let board = Board::from_code(bench.read_word(state::BOARD)?);
-    let codes = bench.read_words(Span {
-        first: state::MODULE_IN_FORCE,
-        last: state::MODULE_IN_FORCE + points::PORTS - 1,
-    })?;
+    let codes = bench.read_words(Span::of(state::MODULE_IN_FORCE, points::PORTS))?;
     let mut modules = [Module::None; points::PORTS as usize];
     for (module, code) in modules.iter_mut().zip(codes) {
         *module = Module::from_code(code).unwrap_or(Module::None);
@@ -186,6 +168,8 @@ fn modio(bench: &mut Bench<'_>, allow_config: bool) -> Check<(Target, Duration)>
         Duration::from_millis(u64::from(delay)) + Duration::from_micros(100) * u32::from(gap);
 
     let mut target = bench.target.clone();
+    target.patience.reply += slower;
+    target.patience.silence += slower;
     target.modio = Some(modio);
     target.strict_t15 = Some(strict == 1);
     let bits = modio.runs(&[Kind::BitInput, Kind::BitOutput]);
@@ -193,16 +177,10 @@ fn modio(bench: &mut Bench<'_>, allow_config: bool) -> Check<(Target, Duration)>
     for block in BLOCKS.into_iter().skip(1) {
         let mut open: Option<Span> = None;
         for (rule, _) in block.registers() {
-            let last = rule.first + (rule.count - 1);
+            let here = Span::of(rule.first, rule.count);
             match &mut open {
-                Some(span) if span.last + 1 == rule.first => span.last = last,
-                _ => {
-                    registers.extend(open);
-                    open = Some(Span {
-                        first: rule.first,
-                        last,
-                    });
-                }
+                Some(span) if span.last + 1 == here.first => span.last = here.last,
+                _ => registers.extend(open.replace(here)),
             }
         }
         registers.extend(open);
@@ -212,11 +190,8 @@ fn modio(bench: &mut Bench<'_>, allow_config: bool) -> Check<(Target, Duration)>
     target.words = match modio.runs(&[Kind::WordOutput]).first() {
         Some(span) => Some(outputs(bench, *span)?),
         // A setting that touches no output: the NTC constants.
-        None if allow_config => Some(Words {
-            span: Span {
-                first: configuration::BETA,
-                last: configuration::BETA + points::COUNT - 1,
-            },
+        None if target.allow_config => Some(Words {
+            span: Span::of(configuration::BETA, points::COUNT),
             low: 2001,
             high: 5000,
             refused: Some(5001),
@@ -224,7 +199,7 @@ fn modio(bench: &mut Bench<'_>, allow_config: bool) -> Check<(Target, Duration)>
         }),
         None => None,
     };
-    Ok((target, slower))
+    Ok(target)
 }
 
 /// Reads the values that analog outputs accept. Returns the first outputs of the span that accept the same values.

@@ -76,20 +76,12 @@ pub struct Known {
 }
 
 impl Profile {
-    /// Reads a profile.
-    ///
-    /// # Errors
-    ///
-    /// When the text is not a profile, in one line.
+    /// Reads a profile. The error is one line.
     pub fn parse(text: &str) -> Result<Self> {
         toml::from_str(text).map_err(|error| anyhow!(error.to_string().trim().replace('\n', " ")))
     }
 
     /// Returns the mode, if the profile names it.
-    ///
-    /// # Errors
-    ///
-    /// When the mode is neither `rtu` nor `ascii`.
     pub fn mode(&self) -> Result<Option<Mode>> {
         Ok(match self.mode.as_deref() {
             None => None,
@@ -99,28 +91,20 @@ impl Profile {
         })
     }
 
-    /// Returns the unit's points.
-    ///
-    /// # Errors
-    ///
-    /// When the profile contradicts itself, in one line.
+    /// Returns the unit's points. The error is one line.
     pub fn known(&self) -> Result<Known> {
         self.mode()?;
         ensure!(
             self.unit != Some(0),
             "unit 0 is the broadcast address: a unit has an address from 1"
         );
-        for (table, name) in [
-            (&self.discrete_inputs, "discrete_inputs"),
-            (&self.input_registers, "input_registers"),
+        for (table, name, can_be_written) in [
+            (&self.coils, "coils", true),
+            (&self.discrete_inputs, "discrete_inputs", false),
+            (&self.input_registers, "input_registers", false),
         ] {
-            ensure!(table.write.is_empty(), "{name} cannot be written");
-        }
-        for (table, name) in [
-            (&self.coils, "coils"),
-            (&self.discrete_inputs, "discrete_inputs"),
-            (&self.input_registers, "input_registers"),
-        ] {
+            let right = can_be_written || table.write.is_empty();
+            ensure!(right, "{name} cannot be written");
             ensure!(
                 table.values.is_none() && table.refused.is_none(),
                 "{name} take no `values` and no `refused`"
@@ -167,11 +151,9 @@ impl Table {
             _ => bail!("{name} take one run to `write`, not several"),
         };
         let readable = spans(&self.read)?;
-        let is_readable = readable
-            .iter()
-            .any(|span| span.first <= run.first && run.last <= span.last);
+        let has_run = |span: &Span| span.has(run.first) && span.has(run.last);
         ensure!(
-            is_readable,
+            readable.iter().any(has_run),
             "{name}: the run in `write` must be part of one run in `read`, so that it can be restored"
         );
         Ok(Some(run))
@@ -220,14 +202,8 @@ mod tests {
         let known = profile.known().unwrap();
         assert_eq!(profile.unit, Some(17));
         assert_eq!(profile.mode().unwrap(), Some(Mode::Rtu));
-        assert_eq!(
-            known.readable[2],
-            [Span {
-                first: 0,
-                last: 255
-            }]
-        );
-        assert_eq!(known.bits, Some(Span { first: 0, last: 15 }));
+        assert_eq!(known.readable[2], [Span::of(0, 256)]);
+        assert_eq!(known.bits, Some(Span::of(0, 16)));
         let words = known.words.unwrap();
         assert_eq!((words.span.first, words.high), (16, 4000));
         assert_eq!(words.refused, Some(5000));
@@ -239,19 +215,13 @@ mod tests {
             ("unit = 300", "unit"),
             ("colour = 1", "colour"),
             ("mode = \"tcp\"", "neither"),
-            ("[coils]\nread = [\"5-3\"]", "5-3"),
-            ("[coils]\nread = [\"0-70000\"]", "70000"),
-            (
-                "[holding_registers]\nread = [\"1\"]\nwrite = [\"1\"]",
-                "values",
-            ),
+            ("[coils]\nread = ['5-3']", "5-3"),
+            ("[coils]\nread = ['0-70000']", "70000"),
+            ("[holding_registers]\nread = ['1']\nwrite = ['1']", "values"),
             ("unit = 0", "unit 0"),
             ("[coils]\nrefused = 3", "no `refused`"),
-            ("[coils]\nread = [\"0-9\"]\nwrite = [\"5-10\"]", "restored"),
-            (
-                "[coils]\nread = [\"0-9\"]\nwrite = [\"1\", \"3\"]",
-                "not several",
-            ),
+            ("[coils]\nread = ['0-9']\nwrite = ['5-10']", "restored"),
+            ("[coils]\nread = ['0-9']\nwrite = ['1', '3']", "not several"),
             (
                 "[holding_registers]\nread = [\"1\"]\nwrite = [\"1\"]\nvalues = [3, 3]",
                 "differ",

@@ -52,10 +52,6 @@ pub struct Files {
 
 impl Files {
     /// Checks that the files can be written. A test takes long, so a wrong path must not show at its end only.
-    ///
-    /// # Errors
-    ///
-    /// The file that cannot be written, and why; or that both options name the same file.
     pub fn check(&self) -> Result<()> {
         if self.junit.is_some() && self.junit == self.json {
             bail!("--junit and --json name the same file");
@@ -65,10 +61,6 @@ impl Files {
     }
 
     /// Writes both reports, the second also when the first cannot be written.
-    ///
-    /// # Errors
-    ///
-    /// The first file that cannot be written, and why.
     pub fn write(&self, junit: &str, json: &serde_json::Value) -> Result<()> {
         let junit = write(self.junit.as_deref(), junit);
         let json = write(self.json.as_deref(), &format!("{json:#}\n"));
@@ -96,7 +88,6 @@ fn cannot_write(path: &Path) -> String {
     format!("cannot write {}", path.display())
 }
 
-/// Returns the error of a command line, in one line.
 fn one_line(error: &clap::Error) -> String {
     let text = error.render().to_string();
     let lines: Vec<&str> = text

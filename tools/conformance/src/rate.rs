@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use modbus_line::LineFormat;
-use register_map::codes::{Command, Format};
+use register_map::codes::{Baud, Command, Format};
 use register_map::configuration::{BAUD, COMMAND, SAVE_EVERY_S};
 
 use crate::bench::Bench;
@@ -121,7 +121,7 @@ fn save(bench: &mut Bench<'_>) -> Check {
 /// Writes, saves and restarts the unit with another rate and format, and sets the endpoint to them.
 fn move_to(bench: &mut Bench<'_>, to: LineFormat) -> Check {
     bench.unlock()?;
-    let values = [(to.baud / 100) as u16, format_code(to)?];
+    let values = codes(to).map_err(Stop::Skip)?;
     let request = write_words(BAUD, &values);
     bench.reply_is(&request, &request[..5])?;
     // The old rate is in force until the restart.
@@ -144,11 +144,12 @@ fn move_to(bench: &mut Bench<'_>, to: LineFormat) -> Check {
     }
 }
 
-/// Returns the value of the register FORMAT for a format; [`Stop::Skip`] when the device does not have the format.
-fn format_code(line: LineFormat) -> Check<u16> {
-    let name = line.format.to_string();
-    let known = Format::NAMES.iter().find(|(_, known)| *known == name);
-    known
-        .map(|(code, _)| *code)
-        .ok_or_else(|| Stop::Skip(format!("the device has no format {name}")))
+/// Returns the values of the registers BAUD and FORMAT for a line. The error says what the device does not have.
+pub(crate) fn codes(line: LineFormat) -> Result<[u16; 2], String> {
+    let (baud, name) = (line.baud, line.format.to_string());
+    let rate = Baud::ALL.iter().find(|rate| rate.bits_per_second() == baud);
+    let rate = rate.ok_or_else(|| format!("the device has no rate of {baud} bit/s"))?;
+    let format = Format::ALL.iter().find(|format| format.name() == name);
+    let format = format.ok_or_else(|| format!("the device has no format {name}"))?;
+    Ok([rate.code(), format.code()])
 }

@@ -6,7 +6,7 @@ use modbus_line::Parity;
 use register_map::codes::Command;
 use register_map::configuration::COMMAND;
 
-use crate::bench::{Bench, Patience};
+use crate::bench::Bench;
 use crate::case::{Case, Failure, Need, Stop};
 use crate::endpoint::{Broken, Endpoint};
 use crate::frame::Mode;
@@ -37,50 +37,23 @@ pub struct Outcome {
     pub asked_again: u32,
 }
 
-/// Options of a run.
-#[derive(Clone, Copy, Debug)]
-pub struct Options {
-    /// How long to wait.
-    pub patience: Patience,
-    /// Whether a modio's configuration may be written.
-    pub allow_config: bool,
-}
-
-/// Runs these cases. Calls `report` with the outcome of each case.
-///
-/// # Errors
-///
-/// When the endpoint no longer works.
+/// Runs these cases.
 pub fn run(
     endpoint: &mut dyn Endpoint,
     target: &Target,
-    options: Options,
     cases: &[Case],
-    report: impl FnMut(&Outcome),
 ) -> Result<Vec<Outcome>, Broken> {
     let mut outcomes = Vec::new();
-    run_while(
-        endpoint,
-        target,
-        options,
-        cases,
-        || true,
-        report,
-        &mut outcomes,
-    )?;
+    run_while(endpoint, target, cases, || true, |_| {}, &mut outcomes)?;
     Ok(outcomes)
 }
 
-/// Runs these cases until `go_on` returns false. `go_on` is called before each case, so a case that has begun also
-/// ends and restores the unit. Adds each outcome to `outcomes`, and calls `report` with it.
-///
-/// # Errors
-///
-/// When the endpoint no longer works. `outcomes` has the outcomes up to then.
+/// Runs these cases until `go_on` returns false. `go_on` is called before each case, so a case that has begun also ends
+/// and restores the unit. Adds each outcome to `outcomes`, and calls `report` with it. When the endpoint no longer
+/// works, `outcomes` has the outcomes up to then.
 pub fn run_while(
     endpoint: &mut dyn Endpoint,
     target: &Target,
-    options: Options,
     cases: &[Case],
     mut go_on: impl FnMut() -> bool,
     mut report: impl FnMut(&Outcome),
@@ -94,10 +67,10 @@ pub fn run_while(
         let lacking = case
             .needs
             .iter()
-            .find_map(|need| lacking(*need, endpoint, target, options.allow_config));
+            .find_map(|need| lacking(*need, endpoint, target));
         let (verdict, asked_again) = match lacking {
             Some(why) => (Verdict::Skipped(why), 0),
-            None => one(endpoint, target, options, case)?,
+            None => one(endpoint, target, case)?,
         };
         let outcome = Outcome {
             case: *case,
@@ -108,9 +81,9 @@ pub fn run_while(
         report(&outcome);
         outcomes.push(outcome);
     }
-    if options.allow_config && target.modio.is_some() {
+    if target.allow_config && target.modio.is_some() {
         // Settings that cases have changed and restored still count as unsaved changes. Drop these changes.
-        let mut bench = Bench::new(endpoint, target, options.patience, true);
+        let mut bench = Bench::new(endpoint, target);
         if bench.unlock().is_ok() {
             let drop_changes = pdu(6, COMMAND, Command::DropChanges.code());
             // A failure is harmless: every case has restored what it changed.
@@ -123,10 +96,9 @@ pub fn run_while(
 fn one(
     endpoint: &mut dyn Endpoint,
     target: &Target,
-    options: Options,
     case: &Case,
 ) -> Result<(Verdict, u32), Broken> {
-    let mut bench = Bench::new(endpoint, target, options.patience, options.allow_config);
+    let mut bench = Bench::new(endpoint, target);
     let writes = case
         .needs
         .iter()
@@ -162,12 +134,7 @@ fn one(
 }
 
 /// Returns the reason why a need is not met, if it is not met.
-fn lacking(
-    need: Need,
-    endpoint: &dyn Endpoint,
-    target: &Target,
-    allow_config: bool,
-) -> Option<String> {
+fn lacking(need: Need, endpoint: &dyn Endpoint, target: &Target) -> Option<String> {
     let able = endpoint.abilities();
     let (met, why) = match need {
         Need::Function(function) => {
@@ -210,7 +177,10 @@ fn lacking(
         ),
         Need::Echo => (able.echo, "the endpoint has no echo to switch"),
         Need::SetLine => (able.set_line, "the endpoint cannot change rate and format"),
-        Need::Config => (allow_config, "writes the configuration: --allow-config"),
+        Need::Config => (
+            target.allow_config,
+            "writes the configuration: --allow-config",
+        ),
         Need::Modio => (target.modio.is_some(), "about the modio only"),
         Need::Rtu => (target.mode == Mode::Rtu, "about RTU framing"),
         Need::Ascii => (target.mode == Mode::Ascii, "about ASCII framing: --ascii"),

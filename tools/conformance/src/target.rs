@@ -6,6 +6,7 @@ use std::fmt;
 use register_map::points::{self, Kind};
 use register_map::{Board, Module};
 
+use crate::bench::Patience;
 use crate::frame::Mode;
 
 /// A run of addresses that one request can ask for.
@@ -19,28 +20,29 @@ pub struct Span {
 
 impl Span {
     /// Returns a span of one address.
-    #[must_use]
     pub const fn one(address: u16) -> Self {
+        Self::of(address, 1)
+    }
+
+    /// Returns a span of `count` addresses, at least one.
+    pub const fn of(first: u16, count: u16) -> Self {
         Self {
-            first: address,
-            last: address,
+            first,
+            last: first + (count - 1),
         }
     }
 
     /// Returns the number of addresses, 1 to 65536.
-    #[must_use]
     pub fn len(self) -> u32 {
         u32::from(self.last - self.first) + 1
     }
 
     /// Always false: a span has at least one address.
-    #[must_use]
     pub const fn is_empty(self) -> bool {
         false
     }
 
     /// Returns the first addresses, `most` at most.
-    #[must_use]
     pub fn up_to(self, most: u16) -> Self {
         let last = self.first.saturating_add(most.saturating_sub(1));
         Self {
@@ -50,7 +52,6 @@ impl Span {
     }
 
     /// Returns whether the span contains the address.
-    #[must_use]
     pub const fn has(self, address: u16) -> bool {
         self.first <= address && address <= self.last
     }
@@ -69,6 +70,17 @@ pub struct Words {
     pub refused: Option<u16>,
     /// They belong to the configuration, whose lock must be opened first.
     pub locked: bool,
+}
+
+impl Words {
+    /// Returns the accepted value that differs from this one.
+    pub const fn other(&self, value: u16) -> u16 {
+        if value == self.high {
+            self.low
+        } else {
+            self.high
+        }
+    }
 }
 
 /// The reply to the probe's request for a function.
@@ -103,7 +115,6 @@ impl Modio {
     }
 
     /// Returns the module in the first slot.
-    #[must_use]
     pub fn module(&self) -> Module {
         self.slots()
             .next()
@@ -118,7 +129,6 @@ impl Modio {
     }
 
     /// Returns the runs of neighbouring points of these kinds.
-    #[must_use]
     pub fn runs(&self, kinds: &[Kind]) -> Vec<Span> {
         let mut runs: Vec<Span> = Vec::new();
         for (address, _) in self.points().filter(|(_, kind)| kinds.contains(kind)) {
@@ -153,6 +163,10 @@ pub struct Target {
     pub unit: u8,
     /// RTU or ASCII.
     pub mode: Mode,
+    /// How long to wait.
+    pub patience: Patience,
+    /// Whether a modio's configuration may be written.
+    pub allow_config: bool,
     /// The functions that were probed.
     pub functions: BTreeMap<u8, Support>,
     /// The readable addresses, for functions 1 to 4. The runs are in ascending order. Two runs follow each other
@@ -172,7 +186,6 @@ pub struct Target {
 
 impl Target {
     /// Returns the runs that this function (1 to 4) reads.
-    #[must_use]
     pub fn readable(&self, function: u8) -> &[Span] {
         match function {
             1..=4 => &self.readable[usize::from(function) - 1],
@@ -181,20 +194,17 @@ impl Target {
     }
 
     /// Returns the longest run that this function reads.
-    #[must_use]
     pub fn longest(&self, function: u8) -> Option<Span> {
         let spans = self.readable(function).iter().copied();
         spans.max_by_key(|span| (span.len(), u16::MAX - span.first))
     }
 
     /// Returns whether the unit has this function.
-    #[must_use]
     pub fn has(&self, function: u8) -> bool {
         self.functions.get(&function) == Some(&Support::Yes)
     }
 
     /// Returns the highest address that this function (1 to 4) cannot read.
-    #[must_use]
     pub fn nowhere(&self, function: u8) -> Option<u16> {
         let spans = self.readable(function);
         (0..=u16::MAX)
@@ -203,7 +213,6 @@ impl Target {
     }
 
     /// Returns the highest address without a coil, or without a register, for a function that writes.
-    #[must_use]
     pub fn nowhere_to_write(&self, function: u8) -> Option<u16> {
         match function {
             5 | 15 => self.nowhere(1),
@@ -226,6 +235,8 @@ mod tests {
         Target {
             unit: 1,
             mode: Mode::Rtu,
+            patience: Patience::default(),
+            allow_config: false,
             functions: BTreeMap::from([(3, Support::Yes), (4, Support::Refused)]),
             readable: [vec![], vec![], holding, vec![]],
             bits: None,

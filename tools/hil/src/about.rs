@@ -64,7 +64,6 @@ pub struct Unit {
 
 impl About {
     /// Describes this computer, this port, this instant, and the commit of this program. The unit is added later.
-    #[must_use]
     pub fn here(port: Option<&Path>, commit: &str) -> Self {
         Self {
             date: Utc::now().to_rfc3339_opts(SecondsFormat::Secs, true),
@@ -83,7 +82,6 @@ impl About {
     }
 
     /// Names and values, in the order in which they are reported.
-    #[must_use]
     pub fn properties(&self) -> Vec<(&'static str, String)> {
         let mut all = vec![
             ("date", self.date.clone()),
@@ -105,7 +103,6 @@ impl About {
     }
 
     /// Returns the description in JSON. Unknown values are null.
-    #[must_use]
     pub fn json(&self) -> Value {
         json!({
             "date": self.date,
@@ -140,17 +137,8 @@ impl fmt::Display for Adapter {
 
 impl Unit {
     /// Reads the registers of the unit, a modio with these modules.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Fail`](conformance::case::Stop::Fail) when the registers cannot be read, `Stop::Broken`.
     pub fn ask(bench: &mut Bench<'_>, modules: Modio) -> Check<Self> {
-        let mut read = |first, count: u16| {
-            bench.read_words(Span {
-                first,
-                last: first + (count - 1),
-            })
-        };
+        let mut read = |first, count| bench.read_words(Span::of(first, count));
         let version = read(state::FIRMWARE_VERSION, 3)?;
         let [firmware, patch, map] = version[..] else {
             unreachable!("three registers were read");

@@ -40,47 +40,57 @@ use serde::{Deserialize, Deserializer};
 use toml::Spanned;
 
 /// The contents of a bench file.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct BenchFile {
     /// The serial port.
     pub port: Option<PathBuf>,
     /// The debug probe.
     pub probe: Option<String>,
     /// Address of the unit under test.
+    #[serde(default, deserialize_with = "unit")]
     pub unit: Option<u8>,
     /// Rate of the line, in bit/s.
+    #[serde(default, deserialize_with = "baud")]
     pub baud: Option<u32>,
     /// Format of the line.
+    #[serde(default, deserialize_with = "text")]
     pub format: Option<Format>,
     /// The module that must be in the first slot.
+    #[serde(default, deserialize_with = "text")]
     pub module: Option<Module>,
     /// Switches the unit's power, followed by `off` or `on`.
     pub power_cmd: Option<String>,
     /// Resets the board.
     pub reset_cmd: Option<String>,
-    /// Digital outputs wired to digital inputs, in the order of the file.
-    pub wires: Vec<Wire>,
-    /// Analog outputs wired to analog inputs, in the order of the file.
-    pub analog: Vec<Analog>,
+    #[serde(default)]
+    wire: Vec<Spanned<Wire>>,
+    #[serde(default)]
+    analog: Vec<Spanned<Analog>>,
 }
 
 /// A wire from a digital output to a digital input.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Wire {
     /// The output.
     pub from: Place,
     /// The input.
     pub to: Place,
     /// The input follows within this time, 1 ms to 60 s.
+    #[serde(rename = "within_ms", default = "usual", deserialize_with = "within")]
     pub within: Duration,
     /// The input is off when the output is on.
+    #[serde(default)]
     pub inverted: bool,
     /// Pulses to send to the input's counter; 0: none.
+    #[serde(default)]
     pub pulses: u16,
 }
 
 /// A wire from an analog output to an analog input.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Analog {
     /// The output.
     pub from: Place,
@@ -89,15 +99,23 @@ pub struct Analog {
     /// Largest difference between output and input, in the unit of both points.
     pub tolerance: u16,
     /// The input follows within this time, 1 ms to 60 s.
+    #[serde(
+        rename = "within_ms",
+        default = "filtered",
+        deserialize_with = "within"
+    )]
     pub within: Duration,
 }
 
 /// A point of a unit on the line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Place {
-    /// The unit's address, 1 to 247 or 255.
+    /// The unit's address, 1 to 247 or 255. Where a file leaves it out it is 0, until [`BenchFile::parse`] has set it.
+    #[serde(default, deserialize_with = "address")]
     pub unit: u8,
     /// The point, 0 to 31.
+    #[serde(deserialize_with = "point")]
     pub point: u16,
 }
 
@@ -119,59 +137,6 @@ impl fmt::Display for Analog {
     }
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct File {
-    port: Option<PathBuf>,
-    probe: Option<String>,
-    #[serde(default, deserialize_with = "unit")]
-    unit: Option<u8>,
-    #[serde(default, deserialize_with = "baud")]
-    baud: Option<u32>,
-    #[serde(default, deserialize_with = "text")]
-    format: Option<Format>,
-    #[serde(default, deserialize_with = "text")]
-    module: Option<Module>,
-    power_cmd: Option<String>,
-    reset_cmd: Option<String>,
-    #[serde(default)]
-    wire: Vec<Spanned<WireInFile>>,
-    #[serde(default)]
-    analog: Vec<Spanned<AnalogInFile>>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct WireInFile {
-    from: PlaceInFile,
-    to: PlaceInFile,
-    #[serde(default = "usual", deserialize_with = "within")]
-    within_ms: Duration,
-    #[serde(default)]
-    inverted: bool,
-    #[serde(default)]
-    pulses: u16,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct AnalogInFile {
-    from: PlaceInFile,
-    to: PlaceInFile,
-    tolerance: u16,
-    #[serde(default = "filtered", deserialize_with = "within")]
-    within_ms: Duration,
-}
-
-#[derive(Clone, Copy, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct PlaceInFile {
-    #[serde(default, deserialize_with = "unit")]
-    unit: Option<u8>,
-    #[serde(deserialize_with = "point")]
-    point: u16,
-}
-
 /// Long enough for an input's debounce of 5 ms, and a slow opto-coupler or relay.
 const fn usual() -> Duration {
     Duration::from_millis(100)
@@ -189,6 +154,10 @@ fn unit<'de, D: Deserializer<'de>>(from: D) -> Result<Option<u8>, D::Error> {
             "unit = {other} is not 1 to 247, or 255"
         ))),
     }
+}
+
+fn address<'de, D: Deserializer<'de>>(from: D) -> Result<u8, D::Error> {
+    unit(from).map(Option::unwrap_or_default)
 }
 
 fn point<'de, D: Deserializer<'de>>(from: D) -> Result<u16, D::Error> {
@@ -235,69 +204,48 @@ impl BenchFile {
     ///
     /// The first error in the file, in one line: `LINE: what`.
     pub fn parse(content: &str, unit: Option<u8>) -> Result<Self, String> {
-        let found = toml::from_str::<File>(content).map_err(|error| {
-            let what = error.message().replace('\n', " ");
-            (error.span().unwrap_or_default(), what)
-        });
-        found
-            .and_then(|file| file.known(unit))
-            .map_err(|(span, what)| {
-                let before = content.get(..span.start).unwrap_or(content);
-                format!("{}: {what}", before.matches('\n').count() + 1)
-            })
-    }
-}
-
-impl File {
-    fn known(self, unit: Option<u8>) -> Result<BenchFile, Wrong> {
-        let here = unit.or(self.unit).unwrap_or(1);
-        let mut ends: Vec<(Place, Place)> = Vec::new();
-        let mut wires = Vec::new();
-        for wire in self.wire {
-            let (span, wire) = (wire.span(), wire.into_inner());
-            let (from, to) = (wire.from.known(here), wire.to.known(here));
-            check(&mut ends, (from, to)).map_err(|what| (span, what))?;
-            wires.push(Wire {
-                from,
-                to,
-                within: wire.within_ms,
-                inverted: wire.inverted,
-                pulses: wire.pulses,
-            });
-        }
-        let mut analog = Vec::new();
-        for wire in self.analog {
-            let (span, wire) = (wire.span(), wire.into_inner());
-            let (from, to) = (wire.from.known(here), wire.to.known(here));
-            check(&mut ends, (from, to)).map_err(|what| (span, what))?;
-            analog.push(Analog {
-                from,
-                to,
-                tolerance: wire.tolerance,
-                within: wire.within_ms,
-            });
-        }
-        Ok(BenchFile {
-            port: self.port,
-            probe: self.probe,
-            unit: self.unit,
-            baud: self.baud,
-            format: self.format,
-            module: self.module,
-            power_cmd: self.power_cmd,
-            reset_cmd: self.reset_cmd,
-            wires,
-            analog,
+        Self::checked(content, unit).map_err(|(span, what)| {
+            let before = content.get(..span.start).unwrap_or(content);
+            format!("{}: {what}", before.matches('\n').count() + 1)
         })
     }
-}
 
-impl PlaceInFile {
-    fn known(self, here: u8) -> Place {
-        Place {
-            unit: self.unit.unwrap_or(here),
-            point: self.point,
+    fn checked(content: &str, unit: Option<u8>) -> Result<Self, Wrong> {
+        let mut file: Self = toml::from_str(content).map_err(|error| {
+            let what = error.message().replace('\n', " ");
+            (error.span().unwrap_or_default(), what)
+        })?;
+        let here = unit.or(file.unit).unwrap_or(1);
+        let wires = file.wire.iter_mut().map(|wire| {
+            let span = wire.span();
+            let Wire { from, to, .. } = wire.get_mut();
+            (span, from, to)
+        });
+        let analog = file.analog.iter_mut().map(|wire| {
+            let span = wire.span();
+            let Analog { from, to, .. } = wire.get_mut();
+            (span, from, to)
+        });
+        let mut ends = Vec::new();
+        for (span, from, to) in wires.chain(analog) {
+            for place in [&mut *from, &mut *to] {
+                if place.unit == 0 {
+                    place.unit = here;
+                }
+            }
+            check(&mut ends, (*from, *to)).map_err(|what| (span, what))?;
         }
+        Ok(file)
+    }
+
+    /// Returns the digital outputs wired to digital inputs, in the order of the file.
+    pub fn wires(&self) -> Vec<Wire> {
+        self.wire.iter().map(|wire| *wire.get_ref()).collect()
+    }
+
+    /// Returns the analog outputs wired to analog inputs, in the order of the file.
+    pub fn analog(&self) -> Vec<Analog> {
+        self.analog.iter().map(|wire| *wire.get_ref()).collect()
     }
 }
 

@@ -86,7 +86,7 @@ pub struct Cli {
     /// Measure at these rates, such as 9600,115200, or `all`; the unit's configuration is saved at each
     /// rate and restored [default: the present rate]
     #[arg(long, value_name = "LIST", value_parser = rates)]
-    pub rates: Option<Rates>,
+    pub rates: Option<List<u32>>,
 
     /// Fail when more than one turnaround in a hundred is longer than this
     #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u64).range(1..=60_000))]
@@ -101,30 +101,24 @@ pub struct Cli {
     pub reports: Files,
 }
 
-/// Rates in bit/s that the device has, in the order given.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Rates(pub Vec<u32>);
+/// A list in one argument. The parser takes a `Vec` for several arguments.
+pub type List<T> = Vec<T>;
 
-fn rates(text: &str) -> Result<Rates, String> {
+fn rates(text: &str) -> Result<List<u32>, String> {
     let known = || Baud::ALL.iter().map(|baud| baud.bits_per_second());
     if text == "all" {
-        return Ok(Rates(known().collect()));
+        return Ok(known().collect());
     }
     let one = |part: &str| {
         let rate = part.trim().parse().ok();
-        rate.filter(|rate| known().any(|other| other == *rate))
-            .ok_or_else(|| {
-                let all: Vec<String> = known().map(|rate| rate.to_string()).collect();
-                format!(
-                    "{part:?} is not a rate of the device; use one of {}",
-                    all.join(" ")
-                )
-            })
+        let rate = rate.filter(|rate| known().any(|other| other == *rate));
+        rate.ok_or_else(|| {
+            let all: Vec<String> = known().map(|rate| rate.to_string()).collect();
+            let all = all.join(" ");
+            format!("{part:?} is not a rate of the device; use one of {all}")
+        })
     };
-    text.split(',')
-        .map(one)
-        .collect::<Result<_, _>>()
-        .map(Rates)
+    text.split(',').map(one).collect()
 }
 
 #[cfg(test)]
@@ -167,8 +161,8 @@ mod tests {
 
     #[test]
     fn rates_are_those_of_the_device() {
-        assert_eq!(rates("9600, 115200"), Ok(Rates(vec![9600, 115_200])));
-        assert_eq!(rates("all").unwrap().0.len(), Baud::ALL.len());
+        assert_eq!(rates("9600, 115200"), Ok(vec![9600, 115_200]));
+        assert_eq!(rates("all").unwrap().len(), Baud::ALL.len());
         let text = rates("9600,300").unwrap_err();
         assert!(
             text.starts_with("\"300\" is not a rate of the device; use one of 1200 "),

@@ -11,7 +11,6 @@ use register_map::{Module, counters, points, state};
 use conformance::endpoint::{Abilities, Broken, Endpoint, Piece, Received};
 use conformance::frame::Mode;
 
-/// One unit.
 pub(super) struct Unit {
     pub address: u8,
     /// Rate and format in force.
@@ -25,21 +24,17 @@ pub(super) struct Unit {
 
 impl Unit {
     pub fn new(address: u8, line: LineFormat) -> Self {
-        let product = state::PRODUCT.to_be_bytes();
-        let word = |at: usize| u16::from_be_bytes([product[at], product[at + 1]]);
         let now = [(line.baud / 100) as u16, 0];
+        let module = state::MODULE_IN_FORCE + MODIO_02.first_port - 1;
         Self {
             address,
             line,
             stored: now,
             registers: BTreeMap::from([
-                (state::PRODUCT_CODE, word(0)),
-                (state::PRODUCT_CODE + 1, word(2)),
+                (state::PRODUCT_CODE, (state::PRODUCT >> 16) as u16),
+                (state::PRODUCT_CODE + 1, state::PRODUCT as u16),
                 (state::BOARD, MODIO_02.code),
-                (
-                    state::MODULE_IN_FORCE + MODIO_02.first_port - 1,
-                    Module::Do4.code(),
-                ),
+                (module, Module::Do4.code()),
                 (BAUD, now[0]),
                 (FORMAT, now[1]),
             ]),
@@ -58,9 +53,8 @@ impl Unit {
         match pdu[0] {
             1 | 2 if address < 32 => vec![pdu[0], 1, u8::from(self.bits[usize::from(address)])],
             3 | 4 => {
-                let words =
-                    (address..address + value).map(|at| self.registers.get(&at).unwrap_or(&0));
-                let data: Vec<u8> = words.flat_map(|word| word.to_be_bytes()).collect();
+                let word = |at| self.registers.get(&at).unwrap_or(&0).to_be_bytes();
+                let data: Vec<u8> = (address..address + value).flat_map(word).collect();
                 [vec![pdu[0], data.len() as u8], data].concat()
             }
             5 if address < 32 => {
@@ -113,7 +107,6 @@ pub(super) enum Fate {
 
 type Watch = Box<dyn FnMut(&[u8], &LineFormat) -> Fate>;
 
-/// The line.
 pub(super) struct Line {
     now: Duration,
     line: LineFormat,
@@ -180,11 +173,9 @@ impl Line {
             return;
         };
         let line = self.line;
-        let at = self
-            .units
-            .iter_mut()
-            .find(|unit| unit.address == address && unit.line == line);
-        let (Some(unit), false) = (at, matches!(fate, Fate::Lost)) else {
+        let mut units = self.units.iter_mut();
+        let unit = units.find(|unit| unit.address == address && unit.line == line);
+        let (Some(unit), false) = (unit, matches!(fate, Fate::Lost)) else {
             return;
         };
         let mut reply = unit.answer(&pdu);
@@ -260,10 +251,8 @@ impl Endpoint for Line {
         quiet: Duration,
         _: usize,
     ) -> Result<Vec<Received>, Broken> {
-        self.now = self
-            .reply
-            .last()
-            .map_or(self.now + patience, |last| last.end + quiet);
+        let last = self.reply.last();
+        self.now = last.map_or(self.now + patience, |last| last.end + quiet);
         Ok(std::mem::take(&mut self.reply))
     }
 }

@@ -28,7 +28,7 @@ use conformance::frame::Mode;
 use conformance::probe::{Given, probe};
 use conformance::rate::tour;
 use conformance::report::table;
-use conformance::run::{Options, Verdict, run_while};
+use conformance::run::{Verdict, run_while};
 
 pub mod about;
 pub mod analog;
@@ -98,7 +98,7 @@ pub fn run(
         profile: None,
         allow_config: plan.allow_config,
     };
-    let (target, patience) = probe(endpoint, &given)?;
+    let target = probe(endpoint, &given)?;
     report.endpoint = endpoint.name();
     let unit = plan.unit;
     let modio = target
@@ -108,7 +108,7 @@ pub fn run(
     if let Some(wanted) = plan.module.filter(|wanted| *wanted != module) {
         bail!("unit {unit} has the module {module} in force, but the bench has {wanted}");
     }
-    let mut bench = Bench::new(endpoint, &target, patience, plan.allow_config);
+    let mut bench = Bench::new(endpoint, &target);
     report.about.unit = Some(about::Unit::ask(&mut bench, modio)?);
     print(&report.endpoint);
     for (name, value) in report.about.properties() {
@@ -118,14 +118,9 @@ pub fn run(
 
     if !plan.cases.is_empty() {
         print(&format!("\nconformance: {} cases", plan.cases.len()));
-        let options = Options {
-            patience,
-            allow_config: plan.allow_config,
-        };
         run_while(
             endpoint,
             &target,
-            options,
             &plan.cases,
             go_on,
             |outcome| print(&table::row(outcome)),
@@ -133,7 +128,7 @@ pub fn run(
         )?;
         print(&table::summary(&report.outcomes));
     }
-    let mut bench = Bench::new(endpoint, &target, patience, plan.allow_config);
+    let mut bench = Bench::new(endpoint, &target);
     if plan.requests > 0 && go_on() {
         timing_at_each_rate(&mut bench, plan, stop, report, print)?;
     }

@@ -72,7 +72,7 @@ fn ask(
         unit: place.unit,
         ..bench.target.clone()
     };
-    let mut other = Bench::new(bench.endpoint, &target, bench.patience, false);
+    let mut other = Bench::new(bench.endpoint, &target);
     match other.ask(request)? {
         Reply::Pdu(reply) if reply[0] == request[0] && right(&reply) => Ok(reply),
         Reply::Silence => other.fail(format!("an answer from unit {}", place.unit)),

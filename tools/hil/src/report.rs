@@ -60,7 +60,6 @@ impl fmt::Display for Finding {
 
 impl Report {
     /// Counts the results of the cases and of the other tests.
-    #[must_use]
     pub fn totals(&self) -> Totals {
         let mut totals = Totals::of(&self.outcomes);
         for finding in &self.findings {
@@ -73,14 +72,12 @@ impl Report {
     pub fn failed(&self) -> impl Iterator<Item = &str> {
         let cases = self.outcomes.iter().map(|o| (o.case.name, &o.verdict));
         let findings = self.findings.iter().map(|f| (f.name.as_str(), &f.verdict));
-        cases
-            .chain(findings)
-            .filter(|(_, verdict)| matches!(verdict, Verdict::Failed(_)))
-            .map(|(name, _)| name)
+        let has_failed = |verdict: &Verdict| matches!(verdict, Verdict::Failed(_));
+        let all = cases.chain(findings);
+        all.filter_map(move |(name, verdict)| has_failed(verdict).then_some(name))
     }
 
     /// Returns a JUnit document: a suite for the cases and one for the other tests.
-    #[must_use]
     pub fn junit(&self) -> String {
         let tests = self.findings.iter().map(|finding| Test {
             name: &finding.name,
@@ -102,21 +99,16 @@ impl Report {
     }
 
     /// Returns the results, and the times of the requests at each rate, in JSON.
-    #[must_use]
     pub fn json(&self) -> Value {
         let totals = self.totals();
-        let findings: Vec<Value> = self
-            .findings
-            .iter()
-            .map(|finding| {
-                let mut value = suite_json::result(&finding.verdict);
-                value["name"] = json!(finding.name);
-                value["about"] = json!(finding.about);
-                value["note"] = json!(finding.note);
-                value["seconds"] = json!(finding.time.as_secs_f64());
-                value
-            })
-            .collect();
+        let findings = self.findings.iter().map(|finding| {
+            let mut value = suite_json::result(&finding.verdict);
+            value["name"] = json!(finding.name);
+            value["about"] = json!(finding.about);
+            value["note"] = json!(finding.note);
+            value["seconds"] = json!(finding.time.as_secs_f64());
+            value
+        });
         json!({
             "about": self.about.json(),
             "endpoint": self.endpoint,
@@ -126,7 +118,7 @@ impl Report {
             "skipped": totals.skipped,
             "suite": suite_json::value(&self.endpoint, &self.outcomes),
             "timing": self.timing.iter().map(tally).collect::<Vec<_>>(),
-            "hil": findings,
+            "hil": findings.collect::<Vec<_>>(),
         })
     }
 }

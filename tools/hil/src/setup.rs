@@ -24,10 +24,6 @@ pub struct Setup {
 
 impl Cli {
     /// Reads the bench file, if one is named.
-    ///
-    /// # Errors
-    ///
-    /// When the file is wrong, or does not fit the command line.
     pub fn setup(&self) -> Result<Setup> {
         let file = match &self.bench {
             None => BenchFile::default(),
@@ -49,7 +45,7 @@ impl Cli {
         if !["8N2", "8E1", "8O1", "8N1"].contains(&format.as_str()) {
             bail!("a modio has no format {format}: use 8N2, 8E1, 8O1 or 8N1");
         }
-        let wires = setup.file.wires.len() + setup.file.analog.len();
+        let wires = setup.file.wires().len() + setup.file.analog().len();
         if self.no_suite && self.requests == 0 && wires == 0 {
             bail!("nothing to test: no suite, no requests, and no wires in a bench file");
         }
@@ -59,7 +55,6 @@ impl Cli {
 
 impl Setup {
     /// Returns the serial port, if the line is on one.
-    #[must_use]
     pub fn port(&self) -> Option<&Path> {
         let port = self.cli.port.as_deref().or(self.file.port.as_deref());
         port.filter(|_| self.cli.tcp.is_none())
@@ -75,10 +70,6 @@ impl Setup {
     }
 
     /// Opens the line.
-    ///
-    /// # Errors
-    ///
-    /// When the line cannot be opened.
     pub fn open(&self) -> Result<Box<dyn Endpoint>, Broken> {
         let line: Box<dyn Endpoint> = match (self.port(), &self.cli.tcp) {
             (Some(port), _) => Box::new(Stream::serial(port, self.line())?),
@@ -93,7 +84,6 @@ impl Setup {
     }
 
     /// Returns how to write the image, if the image is written.
-    #[must_use]
     pub fn flash(&self) -> Option<Flash> {
         let probe = self.cli.probe.as_ref().or(self.file.probe.as_ref());
         self.cli.flash.then(|| Flash {
@@ -103,17 +93,12 @@ impl Setup {
     }
 
     /// Returns the command that resets the board, if there is one.
-    #[must_use]
     pub fn reset(&self) -> Option<&str> {
         let command = self.cli.reset_cmd.as_deref();
         command.or(self.file.reset_cmd.as_deref())
     }
 
     /// Returns the tests to run on this line.
-    ///
-    /// # Errors
-    ///
-    /// When no case has a name that was asked for.
     pub fn plan(&self, endpoint: &dyn Endpoint) -> Result<Plan> {
         let (cli, file) = (&self.cli, &self.file);
         Ok(Plan {
@@ -123,10 +108,10 @@ impl Setup {
             allow_config: cli.allow_config,
             cases: self.cases()?,
             requests: cli.requests,
-            rates: cli.rates.clone().map_or_else(Vec::new, |rates| rates.0),
+            rates: cli.rates.clone().unwrap_or_default(),
             limit: cli.limit.map(Duration::from_millis),
-            wires: file.wires.clone(),
-            analog: file.analog.clone(),
+            wires: file.wires(),
+            analog: file.analog(),
         })
     }
 
@@ -177,24 +162,8 @@ mod tests {
 
     #[test]
     fn command_line_takes_precedence_over_the_bench_file() {
-        let arguments = [
-            "--port",
-            "/dev/b",
-            "--flash",
-            "--probe",
-            "3:4",
-            "--unit",
-            "9",
-            "--baud",
-            "9600",
-            "--format",
-            "8N1",
-            "--module",
-            "4di",
-            "--reset-cmd",
-            "s",
-        ];
-        let merged = setup(FILE, &arguments).unwrap();
+        let arguments = "--port /dev/b --flash --probe 3:4 --unit 9 --baud 9600 --format 8N1 --module 4di --reset-cmd s";
+        let merged = setup(FILE, &arguments.split(' ').collect::<Vec<_>>()).unwrap();
         assert_eq!(merged.port(), Some(Path::new("/dev/b")));
         assert_eq!(merged.line().to_string(), "9600 8N1");
         assert_eq!(merged.flash().unwrap().probe.as_deref(), Some("3:4"));

@@ -20,11 +20,7 @@ pub struct Flash {
 }
 
 impl Flash {
-    /// Writes the image by `cargo xtask flash`.
-    ///
-    /// # Errors
-    ///
-    /// When the command fails. The command has printed the reason.
+    /// Writes the image by `cargo xtask flash`. A command that fails has printed the reason.
     pub fn write(&self) -> Result<()> {
         // The cargo that runs xtask, so that both use the same toolchain.
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
@@ -41,10 +37,6 @@ impl Flash {
 }
 
 /// Runs a command in a shell, and waits for its end.
-///
-/// # Errors
-///
-/// When it ends with a status other than 0.
 pub fn run(script: &str) -> Result<()> {
     let (shell, option) = if cfg!(windows) {
         ("cmd", "/C")
@@ -71,7 +63,6 @@ pub struct Powered {
 
 impl Powered {
     /// Returns a line to a unit whose power is on. `command`, followed by `off` or `on`, switches its power.
-    #[must_use]
     pub const fn new(line: Box<dyn Endpoint>, command: String) -> Self {
         Self {
             line,

@@ -17,7 +17,6 @@ pub struct Spread {
 
 impl Spread {
     /// Sorts times; `None` when there are none.
-    #[must_use]
     pub fn of(mut times: Vec<Duration>) -> Option<Self> {
         times.sort_unstable();
         (!times.is_empty()).then_some(Self { times })
@@ -25,7 +24,6 @@ impl Spread {
 
     /// Returns the time that `percent` of a hundred times do not exceed, by the nearest rank: 0 is the minimum, 50 the
     /// median, 100 the maximum. Each result is a time that was measured.
-    #[must_use]
     pub fn percentile(&self, percent: u8) -> Duration {
         let count = self.times.len();
         let rank = (count * usize::from(percent.min(100))).div_ceil(100);
@@ -33,12 +31,8 @@ impl Spread {
     }
 
     /// Returns a line for each step from the minimum to the 99th percentile, and one line for longer times.
-    #[must_use]
     pub fn histogram(&self) -> String {
-        let (first, top) = (
-            self.percentile(0).as_micros(),
-            self.percentile(99).as_micros(),
-        );
+        let [first, top] = [0, 99].map(|percent| self.percentile(percent).as_micros());
         let step = round_up((top - first) / LINES + 1);
         let begin = first / step * step;
         let end = top / step * step + step;
@@ -113,25 +107,15 @@ mod tests {
         let mut times: Vec<u64> = (0..999).map(|n| 4000 + n % 100).collect();
         times.push(900_000);
         let text = spread(times).histogram();
-        let counts: Vec<usize> = text
-            .lines()
-            .map(|line| {
-                line.split_whitespace()
-                    .rev()
-                    .find_map(|w| w.parse().ok())
-                    .unwrap()
-            })
-            .collect();
-        assert_eq!(counts.iter().sum::<usize>(), 1000, "{text}");
+        let count = |line: &str| -> Option<usize> {
+            let mut words = line.split_whitespace().rev();
+            words.find_map(|word| word.parse().ok())
+        };
+        let counts: Option<usize> = text.lines().map(count).sum();
+        assert_eq!(counts, Some(1000), "{text}");
         assert!(text.lines().count() <= LINES as usize + 2, "{text}");
-        assert!(
-            text.trim_end()
-                .lines()
-                .last()
-                .unwrap()
-                .starts_with("  above"),
-            "{text}"
-        );
+        let last = text.lines().last().unwrap();
+        assert!(last.starts_with("  above"), "{text}");
     }
 
     #[test]

@@ -31,8 +31,26 @@ pub(super) fn run_plan(
     (report, ended.map_err(|error| format!("{error:#}")))
 }
 
+/// Asserts that a text has these parts.
+#[track_caller]
+pub(super) fn has(text: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+}
+
 pub(super) fn never() -> AtomicBool {
     AtomicBool::new(false)
+}
+
+/// Measures with this number of requests at these rates.
+fn measured(line: &mut Line, requests: u32, rates: &[u32]) -> (Report, Result<(), String>) {
+    let plan = Plan {
+        requests,
+        rates: rates.to_vec(),
+        ..plan(line)
+    };
+    run_plan(line, &plan, &never())
 }
 
 fn is_echo(frame: &[u8]) -> bool {
@@ -43,15 +61,11 @@ fn is_echo(frame: &[u8]) -> bool {
 fn every_rate_is_measured_and_the_unit_is_restored() {
     let mut line = Line::new(&[1]);
     let home = line.line();
-    let plan = Plan {
-        requests: 50,
-        rates: vec![9600, 115_200, 19_200],
-        ..plan(&line)
-    };
-    let (report, ended) = run_plan(&mut line, &plan, &never());
+    let wanted = [9600, 115_200, 19_200];
+    let (report, ended) = measured(&mut line, 50, &wanted);
     assert_eq!(ended, Ok(()));
     let rates: Vec<u32> = report.timing.iter().map(|tally| tally.line.baud).collect();
-    assert_eq!(rates, plan.rates);
+    assert_eq!(rates, wanted);
     for tally in &report.timing {
         assert_eq!((tally.sent, tally.lost, tally.wrong), (50, 0, 0));
         assert_eq!(tally.spread.as_ref().unwrap().percentile(50), TURNAROUND);
@@ -65,13 +79,8 @@ fn every_rate_is_measured_and_the_unit_is_restored() {
 #[test]
 fn turnaround_below_t35_fails_the_run() {
     let mut line = Line::new(&[1]);
-    let plan = Plan {
-        requests: 5,
-        // The fake unit answers after 4.1 ms at every rate; t3.5 is 32 ms here.
-        rates: vec![9600, 1200],
-        ..plan(&line)
-    };
-    let (report, ended) = run_plan(&mut line, &plan, &never());
+    // The fake unit answers after 4.1 ms at every rate; t3.5 is 32 ms at 1200 bit/s.
+    let (report, ended) = measured(&mut line, 5, &[9600, 1200]);
     assert_eq!(ended, Ok(()));
     assert_eq!((report.totals().passed, report.totals().failed), (1, 1));
     let json = report.json().to_string();
@@ -82,11 +91,7 @@ fn turnaround_below_t35_fails_the_run() {
 fn endpoint_whose_rate_cannot_be_set_is_measured_at_its_present_rate() {
     let mut line = Line::new(&[1]);
     line.lacks = Some(line.line().baud);
-    let plan = Plan {
-        requests: 10,
-        ..plan(&line)
-    };
-    let (report, ended) = run_plan(&mut line, &plan, &never());
+    let (report, ended) = measured(&mut line, 10, &[]);
     assert_eq!((ended, report.totals().passed), (Ok(()), 1));
 }
 
@@ -102,32 +107,22 @@ fn lost_and_stale_replies_are_counted_apart_and_fail_the_run() {
             _ => Fate::Good,
         }
     });
-    let plan = Plan {
-        requests: 100,
-        ..plan(&line)
-    };
-    let (report, ended) = run_plan(&mut line, &plan, &never());
+    let (report, ended) = measured(&mut line, 100, &[]);
     assert_eq!(ended, Ok(()));
     let tally = &report.timing[0];
-    assert_eq!(
-        (tally.sent, tally.lost, tally.wrong),
-        (100, 2, 1),
-        "{tally}"
-    );
+    let counted = (tally.sent, tally.lost, tally.wrong);
+    assert_eq!(counted, (100, 2, 1), "{tally}");
     let Verdict::Failed(failure) = &report.findings[0].verdict else {
         panic!("{}", report.findings[0]);
     };
-    assert!(
-        failure
-            .came
-            .starts_with("2 lost, 1 wrong, the first to 01 08 00 00"),
-        "{failure:?}"
+    has(
+        &failure.came,
+        &["2 lost, 1 wrong, the first to 01 08 00 00"],
     );
     assert!(report.failed().eq(["timing/9600 8N2"]));
-    assert!(
-        report
-            .junit()
-            .contains("name=\"hil\" tests=\"1\" failures=\"1\"")
+    has(
+        &report.junit(),
+        &["name=\"hil\" tests=\"1\" failures=\"1\""],
     );
 }
 
@@ -139,11 +134,7 @@ fn measurement_ends_early_when_the_unit_stops_answering() {
         echoes += u32::from(is_echo(frame));
         if echoes > 10 { Fate::Lost } else { Fate::Good }
     });
-    let plan = Plan {
-        requests: 5000,
-        ..plan(&line)
-    };
-    let (report, _) = run_plan(&mut line, &plan, &never());
+    let (report, _) = measured(&mut line, 5000, &[]);
     let tally = &report.timing[0];
     assert!(tally.given_up && tally.sent < 40, "{tally}");
 }
@@ -202,12 +193,7 @@ fn change_of_rate_that_fails_half_way_is_undone_in_the_stored_settings_too() {
         }
         Fate::Good
     });
-    let plan = Plan {
-        requests: 5,
-        rates: vec![19_200],
-        ..plan(&line)
-    };
-    let (_, ended) = run_plan(&mut line, &plan, &never());
+    let (_, ended) = measured(&mut line, 5, &[19_200]);
     assert!(ended.unwrap_err().contains("01 06 01 08 00 02"));
     assert_eq!(line.units[0].line.baud, 9600);
     assert_eq!(line.units[0].stored, [96, 0]);
@@ -222,17 +208,9 @@ fn rate_that_cannot_be_restored_is_an_error_with_the_rate_at_which_the_unit_last
         let refused = line.baud != 9600 && frame[1] == 6;
         if refused { Fate::Lost } else { Fate::Good }
     });
-    let plan = Plan {
-        requests: 5,
-        rates: vec![19_200],
-        ..plan(&line)
-    };
-    let (report, ended) = run_plan(&mut line, &plan, &never());
+    let (report, ended) = measured(&mut line, 5, &[19_200]);
     let text = ended.unwrap_err();
-    assert!(
-        text.contains("back to 9600 8N2") && text.contains("last answered at 19200 8N2"),
-        "{text}"
-    );
+    has(&text, &["back to 9600 8N2", "last answered at 19200 8N2"]);
     assert_eq!(report.timing.len(), 1, "the report has the measurement");
 }
 
@@ -240,12 +218,7 @@ fn rate_that_cannot_be_restored_is_an_error_with_the_rate_at_which_the_unit_last
 fn rate_that_the_port_does_not_support_is_an_error_before_the_unit_is_changed() {
     let mut line = Line::new(&[1]);
     line.lacks = Some(921_600);
-    let plan = Plan {
-        requests: 5,
-        rates: vec![19_200, 921_600],
-        ..plan(&line)
-    };
-    let (report, ended) = run_plan(&mut line, &plan, &never());
+    let (report, ended) = measured(&mut line, 5, &[19_200, 921_600]);
     assert_eq!(ended.unwrap_err(), "a fake does not take 921600 8N2");
     assert_eq!((report.timing.len(), line.units[0].saves), (0, 0));
     assert_eq!(line.line().baud, 9600);
@@ -255,12 +228,7 @@ fn rate_that_the_port_does_not_support_is_an_error_before_the_unit_is_changed() 
 fn a_unit_with_unsaved_settings_keeps_its_rate() {
     let mut line = Line::new(&[1]);
     line.units[0].registers.insert(state::STATUS, 1 << 3);
-    let plan = Plan {
-        requests: 5,
-        rates: vec![19_200],
-        ..plan(&line)
-    };
-    let (_, ended) = run_plan(&mut line, &plan, &never());
+    let (_, ended) = measured(&mut line, 5, &[19_200]);
     assert!(ended.unwrap_err().contains("not saved"));
     assert_eq!(line.units[0].saves, 0);
 }
@@ -274,11 +242,8 @@ fn unit_with_another_module_than_the_bench_is_not_tested() {
         ..plan(&line)
     };
     let (report, ended) = run_plan(&mut line, &plan, &never());
-    let error = ended.unwrap_err();
-    assert_eq!(
-        error,
-        "unit 1 has the module 4do in force, but the bench has 4ao"
-    );
+    let error = "unit 1 has the module 4do in force, but the bench has 4ao";
+    assert_eq!(ended.unwrap_err(), error);
     assert!(report.timing.is_empty());
     let plan = Plan {
         module: Some(Module::Do4),
@@ -294,11 +259,7 @@ fn reports_say_which_unit_was_tested() {
     registers.insert(state::FIRMWARE_VERSION, 0x0102);
     registers.insert(state::FIRMWARE_PATCH, 3);
     registers.insert(state::UNIQUE_ID, 0xABCD);
-    let plan = Plan {
-        requests: 5,
-        ..plan(&line)
-    };
-    let (report, _) = run_plan(&mut line, &plan, &never());
+    let (report, _) = measured(&mut line, 5, &[]);
     let unit = &report.json()["about"]["unit"];
     assert_eq!(unit["firmware"], "1.2.3");
     assert_eq!(unit["identity"], "ABCD00000000000000000000");
@@ -307,16 +268,13 @@ fn reports_say_which_unit_was_tested() {
         (&"4do".into(), true)
     );
     let xml = report.junit();
-    assert!(
-        xml.contains("<property name=\"firmware\" value=\"1.2.3\"/>"),
-        "{xml}"
-    );
+    has(&xml, &["<property name=\"firmware\" value=\"1.2.3\"/>"]);
 
     // Register map 2 has the commit.
     let registers = &mut line.units[0].registers;
     registers.insert(state::MAP_VERSION, 2);
     registers.extend([(0x020C, 0x0123), (0x020D, 0xABCD), (0x020E, 1)]);
-    let (report, _) = run_plan(&mut line, &plan, &never());
+    let (report, _) = measured(&mut line, 5, &[]);
     assert_eq!(report.json()["about"]["unit"]["commit"], "0123abcd-dirty");
 }
 

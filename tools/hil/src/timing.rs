@@ -48,7 +48,6 @@ pub struct Tally {
 const TOLERANCE: Duration = Duration::from_micros(1);
 
 /// Returns the shortest time that this number of requests takes at the line's rate.
-#[must_use]
 pub fn least(bench: &Bench<'_>, requests: u32) -> Duration {
     let line = bench.endpoint.line();
     let frame = bench.frame(&echo(0)).len();
@@ -60,13 +59,8 @@ fn echo(number: u16) -> Vec<u8> {
 }
 
 /// Sends this number of requests, each as soon as the line allows. Ends early when `stop` is set.
-///
-/// # Errors
-///
-/// [`Stop::Broken`](conformance::case::Stop::Broken).
 pub fn measure(bench: &mut Bench<'_>, requests: u32, stop: &AtomicBool) -> Check<Tally> {
     let line = bench.endpoint.line();
-    let exact = bench.endpoint.abilities().exact;
     let mut tally = Tally {
         line,
         sent: 0,
@@ -86,25 +80,16 @@ pub fn measure(bench: &mut Bench<'_>, requests: u32, stop: &AtomicBool) -> Check
         let begin = bench.endpoint.now();
         let reply = bench.exchange_until(&[Piece::Bytes(frame)], length)?;
         tally.sent += 1;
-        lost_in_a_row = if reply == Reply::Silence {
-            lost_in_a_row + 1
-        } else {
-            0
-        };
+        let lost = reply == Reply::Silence;
+        lost_in_a_row = if lost { lost_in_a_row + 1 } else { 0 };
         if reply == Reply::Pdu(request) {
-            if let (Some(first), Some(last)) = (bench.received.first(), bench.received.last()) {
-                times.push(if exact {
-                    first.start.saturating_sub(bench.sent_end)
-                } else {
-                    last.end.saturating_sub(begin + line.characters(2 * length))
-                });
+            if let Some(last) = bench.received.last() {
+                let whole = begin + line.characters(2 * length);
+                times.push(bench.exact(bench.turnaround(), last.end.saturating_sub(whole)));
             }
         } else {
-            if reply == Reply::Silence {
-                tally.lost += 1;
-            } else {
-                tally.wrong += 1;
-            }
+            tally.lost += u32::from(lost);
+            tally.wrong += u32::from(!lost);
             if let (None, Err(conformance::case::Stop::Fail(failure))) =
                 (&tally.example, bench.fail::<()>("the request, echoed"))
             {
@@ -124,7 +109,6 @@ pub fn measure(bench: &mut Bench<'_>, requests: u32, stop: &AtomicBool) -> Check
 impl Tally {
     /// Passes when every request got its reply, no reply was early, and 99 of 100 turnarounds are within the limit, if
     /// there is a limit.
-    #[must_use]
     pub fn verdict(&self, limit: Option<Duration>) -> Verdict {
         let bad = |came: String, wanted: String| {
             Verdict::Failed(Failure {
@@ -143,20 +127,16 @@ impl Tally {
         }
         let shortest = self.spread.as_ref().map(|spread| spread.percentile(0));
         if let Some(shortest) = shortest.filter(|time| *time + TOLERANCE < self.least) {
-            return bad(
-                format!("a turnaround of {shortest:?}"),
-                format!("{:?} at least: t3.5, or FRAME_GAP", self.least),
-            );
+            let wanted = format!("{:?} at least: t3.5, or FRAME_GAP", self.least);
+            return bad(format!("a turnaround of {shortest:?}"), wanted);
         }
         match (&self.spread, limit) {
             (None, _) => Verdict::Skipped("interrupted before the first reply".to_owned()),
-            (Some(spread), Some(limit)) if spread.percentile(99) > limit => bad(
-                format!(
-                    "a turnaround of {:?} at the 99th percentile",
-                    spread.percentile(99)
-                ),
-                format!("{limit:?} at most"),
-            ),
+            (Some(spread), Some(limit)) if spread.percentile(99) > limit => {
+                let time = spread.percentile(99);
+                let came = format!("a turnaround of {time:?} at the 99th percentile");
+                bad(came, format!("{limit:?} at most"))
+            }
             (Some(_), _) => Verdict::Passed,
         }
     }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::bench_file::BenchFile;
 use super::fake::{Fate, Line};
-use super::tests::{never, plan, run_plan};
+use super::tests::{has, never, plan, run_plan};
 use super::*;
 
 fn wired(text: &str) -> (Line, Plan) {
@@ -13,8 +13,8 @@ fn wired(text: &str) -> (Line, Plan) {
     line.units[0].bits[16] = true;
     let file = BenchFile::parse(text, None).unwrap();
     let plan = Plan {
-        wires: file.wires,
-        analog: file.analog,
+        wires: file.wires(),
+        analog: file.analog(),
         ..plan(&line)
     };
     (line, plan)
@@ -22,6 +22,22 @@ fn wired(text: &str) -> (Line, Plan) {
 
 const WIRES: &str = "[[wire]]\nfrom = { point = 16 }\nto = { unit = 2, point = 16 }\n\
                      [[wire]]\nfrom = { point = 17 }\nto = { unit = 2, point = 17 }\n";
+
+/// Returns the findings that failed. The outputs must have their values of before.
+fn failing((mut line, plan): (Line, Plan)) -> Vec<String> {
+    let outputs = |line: &Line| {
+        let unit = &line.units[0];
+        let analog = (18..20).map(|point| unit.registers.get(&point).copied().unwrap_or_default());
+        (unit.bits[16..18].to_vec(), analog.collect::<Vec<_>>())
+    };
+    let before = outputs(&line);
+    let (report, ended) = run_plan(&mut line, &plan, &never());
+    assert_eq!(ended, Ok(()));
+    assert_eq!(outputs(&line), before, "put back");
+    let findings = report.findings.iter();
+    let failed = findings.filter(|finding| finding.verdict != Verdict::Passed);
+    failed.map(ToString::to_string).collect()
+}
 
 #[test]
 fn wires_as_described_pass_and_outputs_are_restored() {
@@ -35,41 +51,25 @@ fn wires_as_described_pass_and_outputs_are_restored() {
 
 #[test]
 fn wrong_wires_fail_each_with_its_reason() {
-    let failing = |mut line: Line, plan: Plan| {
-        let (report, ended) = run_plan(&mut line, &plan, &never());
-        assert_eq!(ended, Ok(()));
-        assert_eq!(line.units[0].bits[16..18], [true, false], "put back");
-        let failed = report
-            .findings
-            .iter()
-            .filter(|f| f.verdict != Verdict::Passed);
-        failed.map(ToString::to_string).collect::<Vec<_>>()
-    };
     let (mut line, plan) = wired(WIRES);
     line.wires.pop();
-    let [broken] = &failing(line, plan)[..] else {
+    let [broken] = &failing((line, plan))[..] else {
         panic!("one wire is broken");
     };
     assert!(broken.contains("unit 2 point 0x0011 stays off"), "{broken}");
 
     let (mut line, plan) = wired(WIRES);
     line.wires.push([(1, 16), (2, 17)]);
-    let crossed = failing(line, plan).concat();
-    assert!(
-        crossed.contains("unit 2 point 0x0011 changed to on as well"),
-        "{crossed}"
-    );
+    let crossed = failing((line, plan)).concat();
+    has(&crossed, &["unit 2 point 0x0011 changed to on as well"]);
 
-    let (line, plan) = wired(&WIRES.replace("unit = 2, point = 17", "unit = 3, point = 17"));
-    let silent = failing(line, plan).concat();
+    let other_unit = WIRES.replace("unit = 2, point = 17", "unit = 3, point = 17");
+    let silent = failing(wired(&other_unit)).concat();
     assert!(silent.contains("an answer from unit 3"), "{silent}");
 
-    let (line, plan) = wired(&WIRES.replacen("}\n[[", "}\ninverted = true\n[[", 1));
-    let inverted = failing(line, plan).concat();
-    assert!(
-        inverted.contains("unit 2 point 0x0010 stays off"),
-        "{inverted}"
-    );
+    let inverted = WIRES.replacen("}\n[[", "}\ninverted = true\n[[", 1);
+    let inverted = failing(wired(&inverted)).concat();
+    has(&inverted, &["unit 2 point 0x0010 stays off"]);
 }
 
 const PULSES: &str =
@@ -108,7 +108,7 @@ fn analog() -> (Line, Plan) {
     line.analog = vec![([(1, 18), (1, 16)], 20), ([(1, 19), (1, 17)], 20)];
     line.units[0].registers.insert(18, 1234);
     let plan = Plan {
-        analog: BenchFile::parse(ANALOG, None).unwrap().analog,
+        analog: BenchFile::parse(ANALOG, None).unwrap().analog(),
         ..plan(&line)
     };
     (line, plan)
@@ -127,48 +127,32 @@ fn analog_wires_within_the_tolerance_pass_and_outputs_are_restored() {
 
 #[test]
 fn wrong_analog_wires_fail_each_with_its_reason() {
-    let failing = |mut line: Line, plan: Plan| {
-        let (report, ended) = run_plan(&mut line, &plan, &never());
-        assert_eq!(ended, Ok(()));
-        assert_eq!(line.units[0].registers[&18], 1234, "put back");
-        let failed = report
-            .findings
-            .iter()
-            .filter(|f| f.verdict != Verdict::Passed);
-        failed.map(ToString::to_string).collect::<Vec<_>>()
-    };
     let (mut line, plan) = analog();
     line.analog[1].1 = 21;
-    let [inexact] = &failing(line, plan)[..] else {
+    let [inexact] = &failing((line, plan))[..] else {
         panic!("one wire is inexact");
     };
-    assert!(
-        inexact.contains("unit 1 point 0x0011 is 21 after"),
-        "{inexact}"
-    );
+    has(inexact, &["unit 1 point 0x0011 is 21 after"]);
 
     let (mut line, plan) = analog();
     line.analog.pop();
-    let [broken] = &failing(line, plan)[..] else {
+    let [broken] = &failing((line, plan))[..] else {
         panic!("one wire is broken");
     };
-    assert!(
-        broken.contains("unit 1 point 0x0011 is 0 after"),
-        "{broken}"
-    );
+    has(broken, &["unit 1 point 0x0011 is 0 after"]);
 
     let (mut line, plan) = analog();
     line.analog[1].0[0] = (1, 18);
-    let crossed = failing(line, plan).concat();
-    assert!(
-        crossed.contains("unit 1 point 0x0011 changed from 20 to 4115 as well"),
-        "{crossed}"
+    let crossed = failing((line, plan)).concat();
+    has(
+        &crossed,
+        &["unit 1 point 0x0011 changed from 20 to 4115 as well"],
     );
 
     let (mut line, plan) = analog();
     let scale = register_map::configuration::SCALE + 16;
     line.units[0].registers.insert(scale, 1);
-    let [differs] = &failing(line, plan)[..] else {
+    let [differs] = &failing((line, plan))[..] else {
         panic!("one wire has two scales");
     };
     assert!(differs.contains("the same signal and scale"), "{differs}");

@@ -15,11 +15,8 @@ use conformance::bench::Bench;
 use conformance::case::{Check, Failure, Stop};
 use conformance::run::Verdict;
 
-/// Tests the wires until `stop` is set. Calls `report` with each finding.
-///
-/// # Errors
-///
-/// [`Stop::Broken`] when the line no longer works, [`Stop::Fail`] when an output could not be restored.
+/// Tests the wires until `stop` is set. Calls `report` with each finding. Fails when the line no longer works, or when
+/// an output could not be restored.
 pub fn run(
     bench: &mut Bench<'_>,
     wires: &[Wire],

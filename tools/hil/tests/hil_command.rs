@@ -11,7 +11,6 @@ use std::process::{Command, Output};
 /// A directory with a log of what was done, and a `cargo` that writes its arguments to the log.
 struct Fake {
     directory: tempfile::TempDir,
-    /// A line without a unit.
     line: TcpListener,
 }
 
@@ -63,15 +62,7 @@ fn complaint(output: &Output) -> String {
 fn image_is_written_then_the_board_is_reset_then_tested() {
     let fake = Fake::new("");
     let reset = fake.note("reset");
-    let arguments = [
-        "--flash",
-        "--probe",
-        "1:2",
-        "--elf",
-        "x",
-        "--reset-cmd",
-        &reset,
-    ];
+    let arguments = ["--flash", "--probe=1:2", "--elf=x", "--reset-cmd", &reset];
     let output = fake.run(&arguments);
     assert_eq!(fake.log(), ["xtask flash --probe 1:2 --elf x", "reset"]);
     let error = complaint(&output);

@@ -227,6 +227,29 @@ fn identification_length(frame: &[u8]) -> Option<usize> {
     Some(end + 2)
 }
 
+/// Returns a request's function, address and one more word.
+#[must_use]
+pub fn pdu(function: u8, address: u16, word: u16) -> Vec<u8> {
+    let ([ah, al], [wh, wl]) = (address.to_be_bytes(), word.to_be_bytes());
+    vec![function, ah, al, wh, wl]
+}
+
+/// Returns a write of several registers, function 10.
+#[must_use]
+pub fn write_words(address: u16, values: &[u16]) -> Vec<u8> {
+    let mut request = pdu(0x10, address, values.len() as u16);
+    request.push((values.len() * 2) as u8);
+    request.extend(values.iter().flat_map(|value| value.to_be_bytes()));
+    request
+}
+
+/// Returns the words of a response to function 03, 04 or 17.
+#[must_use]
+pub fn words_of(response: &[u8]) -> Vec<u16> {
+    let (pairs, _) = response.get(2..).unwrap_or_default().as_chunks::<2>();
+    pairs.iter().map(|pair| u16::from_be_bytes(*pair)).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -103,27 +103,20 @@ air.")]
 pub struct Scan {
     /// Addresses to ask, such as 1-20,40
     #[arg(long, value_name = "LIST", default_value = "1-247", value_parser = units)]
-    pub units: Units,
+    pub units: List<u8>,
     /// Rates to try in bit/s, such as 9600,19200, or all; default: that of the endpoint
     #[arg(long, value_name = "LIST", value_parser = rates)]
-    pub rates: Option<Rates>,
+    pub rates: Option<List<u32>>,
     /// Formats to try, such as 8N2,8E1, or all; default: that of the endpoint. Those with 7 data bits are tried in ASCII
     /// mode
     #[arg(long, value_name = "LIST", value_parser = formats)]
-    pub formats: Option<Formats>,
+    pub formats: Option<List<modbus_line::Format>>,
 }
 
-/// Unit addresses, in ascending order.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Units(pub Vec<u8>);
-/// Rates in bit/s.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Rates(pub Vec<u32>);
-/// Formats.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Formats(pub Vec<modbus_line::Format>);
+/// A list in one argument. The parser takes a `Vec` for several arguments.
+pub type List<T> = Vec<T>;
 
-fn units(text: &str) -> Result<Units, String> {
+fn units(text: &str) -> Result<List<u8>, String> {
     let wrong = || format!("{text:?} is not a list of unit addresses 1 to 247, such as 1-20,40");
     let mut units = Vec::new();
     for part in text.split(',') {
@@ -137,31 +130,30 @@ fn units(text: &str) -> Result<Units, String> {
     }
     units.sort_unstable();
     units.dedup();
-    Ok(Units(units))
+    Ok(units)
 }
 
-fn rates(text: &str) -> Result<Rates, String> {
+fn rates(text: &str) -> Result<List<u32>, String> {
     if text == "all" {
         let all = Baud::ALL.iter();
-        return Ok(Rates(all.map(|baud| baud.bits_per_second()).collect()));
+        return Ok(all.map(|baud| baud.bits_per_second()).collect());
     }
     let each = text.split(',').map(|part| part.trim().parse::<u32>());
     let rates = each.collect::<Result<Vec<_>, _>>();
     match rates {
-        Ok(rates) if rates.iter().all(|rate| RATES.contains(rate)) => Ok(Rates(rates)),
+        Ok(rates) if rates.iter().all(|rate| RATES.contains(rate)) => Ok(rates),
         _ => Err(format!(
             "{text:?} is not a list of rates such as 9600,19200, nor `all`"
         )),
     }
 }
 
-fn formats(text: &str) -> Result<Formats, String> {
+fn formats(text: &str) -> Result<List<modbus_line::Format>, String> {
     let names: Vec<_> = match text {
         "all" => Format::NAMES.iter().map(|(_, name)| *name).collect(),
         text => text.split(',').map(str::trim).collect(),
     };
-    let each = names.into_iter().map(str::parse);
-    Ok(Formats(each.collect::<Result<_, _>>()?))
+    names.into_iter().map(str::parse).collect()
 }
 
 /// Read points and registers.
@@ -336,7 +328,7 @@ pub struct Export {
     pub format: ExportFormat,
     /// Addresses of the units on the line, such as 1-3,7; default: the unit of the endpoint
     #[arg(long, value_name = "LIST", value_parser = units)]
-    pub units: Option<Units>,
+    pub units: Option<List<u8>>,
     /// Name of the line, in front of the names of its units; needed when the system has other lines with modio units
     #[arg(long, value_name = "NAME", value_parser = line_name)]
     pub name: Option<String>,
@@ -410,12 +402,12 @@ mod tests {
 
     #[test]
     fn lists_of_units_are_parsed() {
-        assert_eq!(units("3,1-2,2"), Ok(Units(vec![1, 2, 3])));
+        assert_eq!(units("3,1-2,2"), Ok(vec![1, 2, 3]));
         for wrong in ["", "0", "248", "5-3", "1-", "x"] {
             assert!(units(wrong).is_err(), "{wrong}");
         }
-        assert_eq!(rates("all").unwrap().0.len(), 11);
+        assert_eq!(rates("all").unwrap().len(), 11);
         assert!(rates("9600,x").is_err());
-        assert_eq!(formats("all").unwrap().0.len(), 7);
+        assert_eq!(formats("all").unwrap().len(), 7);
     }
 }

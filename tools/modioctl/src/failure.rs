@@ -29,7 +29,6 @@ impl Failure {
     }
 
     /// Returns the exit status.
-    #[must_use]
     pub const fn status(&self) -> u8 {
         match self {
             Self::Refused(_) => 1,
@@ -41,13 +40,11 @@ impl Failure {
     }
 
     /// Returns whether asking again later can help: the line or the unit failed, not the request.
-    #[must_use]
     pub const fn may_pass(&self) -> bool {
         matches!(self, Self::NoAnswer(_) | Self::Garbled(_) | Self::Port(_))
     }
 
     /// Returns the failure with the present action in front.
-    #[must_use]
     pub fn while_doing(self, what: impl fmt::Display) -> Self {
         let said = |text: String| format!("{what}: {text}");
         match self {

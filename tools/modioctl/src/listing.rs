@@ -1,6 +1,6 @@
 //! The points and registers of a unit as JSON, and their values in words.
 
-use modio_description::Unit;
+use modio_description::Value;
 use serde_json::{Value as Json, json};
 
 use crate::failure::Failure;
@@ -8,10 +8,6 @@ use crate::names::{Book, Item, Meaning};
 use crate::value::{table_name, takes, unit_name};
 
 /// Returns the description of a unit for programs. `source` is the source of the description.
-///
-/// # Errors
-///
-/// When the unit is not a modio.
 pub fn as_json(book: &Book, source: &str) -> Result<Json, Failure> {
     let about = book.of_modio()?;
     Ok(json!({
@@ -24,22 +20,11 @@ pub fn as_json(book: &Book, source: &str) -> Result<Json, Failure> {
     }))
 }
 
-fn unit(item: &Item) -> Unit {
-    match &item.meaning {
-        Meaning::Analog(reading) => reading.unit.clone(),
-        Meaning::Value(
-            modio_description::Value::Number(unit) | modio_description::Value::Long(unit),
-        ) => unit.clone(),
-        _ => Unit::default(),
-    }
-}
-
 /// Returns the allowed values of an item, for people.
-#[must_use]
 pub fn values(item: &Item) -> String {
-    let unit = unit(item);
+    let unit = item.unit();
     match (&item.values, &item.meaning) {
-        (_, Meaning::Value(modio_description::Value::Codes(names))) => {
+        (_, Meaning::Value(Value::Codes(names))) => {
             let allowed = names.iter().filter(|(code, _)| item.allows(*code));
             let names: Vec<_> = allowed.map(|(_, name)| name.as_str()).collect();
             names.join(" | ")
@@ -50,7 +35,6 @@ pub fn values(item: &Item) -> String {
     }
 }
 
-/// Returns an item for programs.
 fn item_json(item: &Item) -> Json {
     json!({
         "name": item.name,
@@ -60,7 +44,7 @@ fn item_json(item: &Item) -> Json {
         "writable": item.writable,
         "setting": item.setting,
         "restart": item.restart,
-        "unit": unit_name(&unit(item).code),
+        "unit": unit_name(&item.unit().code),
         "values": values(item),
         "about": item.about,
     })

@@ -1,7 +1,7 @@
 //! Names of points and registers: `p5.1`, `p5.1.filter`, `p5.module`, `BAUD`, or an address.
 
 use modio_description::{
-    Description, ModuleType, PointKind, Reading, Register, Scope, Table, Value, Values,
+    Description, ModuleType, PointKind, Reading, Register, Scope, Table, Unit, Value, Values,
 };
 
 use crate::failure::Failure;
@@ -38,13 +38,21 @@ pub struct Item {
 
 impl Item {
     /// Returns whether a value is allowed. Every value is when the allowed ones are not known.
-    #[must_use]
     pub fn allows(&self, word: u16) -> bool {
         match &self.values {
             None => true,
             Some(Values::Range(min, max)) => (*min..=*max).contains(&word),
             Some(Values::RangeOr(also, min, max)) => word == *also || (*min..=*max).contains(&word),
             Some(Values::OneOf(values)) => values.contains(&word),
+        }
+    }
+
+    /// Returns the unit of its number, without a name where it has none.
+    pub fn unit(&self) -> Unit {
+        match &self.meaning {
+            Meaning::Analog(reading) => reading.unit.clone(),
+            Meaning::Value(Value::Number(unit) | Value::Long(unit)) => unit.clone(),
+            _ => Unit::default(),
         }
     }
 }
@@ -84,7 +92,6 @@ pub struct Book {
 
 impl Book {
     /// Creates the names of a unit. `readings` contains RANGE and SCALE of every point.
-    #[must_use]
     pub fn new(description: Description, readings: Vec<(u16, u16)>) -> Self {
         let mut items = points(&description, &readings);
         for register in &description.registers {
@@ -97,28 +104,21 @@ impl Book {
     }
 
     /// Returns the unit's description; `None` for a unit that is not a modio.
-    #[must_use]
     pub const fn description(&self) -> Option<&Description> {
         self.description.as_ref()
     }
 
     /// Returns all items: the points, then the registers in the order of their addresses.
-    #[must_use]
     pub fn items(&self) -> &[Item] {
         &self.items
     }
 
     /// Returns the item with exactly this name.
-    #[must_use]
     pub fn item(&self, name: &str) -> Option<&Item> {
         self.items.iter().find(|item| item.name == name)
     }
 
     /// Returns the description of a unit that must be a modio.
-    ///
-    /// # Errors
-    ///
-    /// When the unit is another device.
     pub fn of_modio(&self) -> Result<&Description, Failure> {
         self.description().ok_or_else(|| {
             Failure::Refused(
@@ -135,7 +135,6 @@ impl Book {
     }
 
     /// Returns the ports with a slot and their points, including points whose values have no known meaning.
-    #[must_use]
     pub fn ports(&self) -> Vec<PortItems> {
         let Some(description) = &self.description else {
             return Vec::new();
@@ -160,11 +159,7 @@ impl Book {
         self.items.iter().filter(|item| item.setting)
     }
 
-    /// Returns the item with this name or address.
-    ///
-    /// # Errors
-    ///
-    /// When there is no such item; the error contains similar names.
+    /// Returns the item with this name or address. The error contains similar names.
     pub fn find(&self, name: &str) -> Result<Item, Failure> {
         let wanted = slug(name);
         if let Some(item) = self.items.iter().find(|item| slug(&item.name) == wanted) {
@@ -172,16 +167,18 @@ impl Book {
         }
         if let Some(address) = number_of(name) {
             // The first item that contains the address, if it begins there.
-            let at = |item: &&Item| {
-                address
-                    .checked_sub(item.address)
-                    .is_some_and(|n| n < item.words)
-            };
-            let known = self.items.iter().find(at);
+            let before = |item: &Item| address.checked_sub(item.address);
+            let has = |item: &&Item| before(item).is_some_and(|n| n < item.words);
+            let known = self.items.iter().find(has);
             let known = known.filter(|item| item.address == address);
             return Ok(known.cloned().unwrap_or_else(|| unknown(address)));
         }
         Err(Failure::usage(self.no_such(name, &wanted)))
+    }
+
+    /// Returns the items with these names or addresses.
+    pub fn find_all(&self, names: &[String]) -> Result<Vec<Item>, Failure> {
+        names.iter().map(|name| self.find(name)).collect()
     }
 
     fn no_such(&self, name: &str, wanted: &str) -> String {
@@ -190,18 +187,9 @@ impl Book {
                 "{name}: the names of this unit are not known; give an address such as 0x0010"
             );
         }
-        let mut near: Vec<_> = self
-            .items
-            .iter()
-            .map(|item| {
-                (
-                    strsim::damerau_levenshtein(&slug(&item.name), wanted),
-                    &item.name,
-                )
-            })
-            .collect();
-        near.sort_by_key(|(distance, _)| *distance);
-        let near: Vec<_> = near.iter().take(4).map(|(_, name)| name.as_str()).collect();
+        let mut near: Vec<_> = self.items.iter().map(|item| item.name.as_str()).collect();
+        near.sort_by_cached_key(|name| strsim::damerau_levenshtein(&slug(name), wanted));
+        near.truncate(4);
         format!(
             "{name}: no such point or register; similar names: {}; `modioctl describe` lists all",
             near.join(", ")
@@ -231,13 +219,11 @@ pub fn number_of(text: &str) -> Option<u16> {
 }
 
 /// Returns the number of a port: `p5` or `5`.
-#[must_use]
 pub fn port_number(text: &str) -> Option<u8> {
     text.strip_prefix(['p', 'P']).unwrap_or(text).parse().ok()
 }
 
 /// Returns the port in a name such as `p5.1.filter` or `5.module`.
-#[must_use]
 pub fn port_of(name: &str) -> Option<u8> {
     port_number(name.trim().split_once('.')?.0)
 }
@@ -249,13 +235,11 @@ fn module(description: &Description, code: u16) -> Option<&ModuleType> {
 }
 
 /// Returns the name of the module with this code; `unknown` for a code without a name.
-#[must_use]
 pub fn module_name(description: &Description, code: u16) -> &str {
     module(description, code).map_or("unknown", |module| &module.name)
 }
 
 /// Lists the ports with a slot, for people.
-#[must_use]
 pub fn slots(description: &Description) -> String {
     let ports = description.ports.iter();
     let ports: Vec<_> = ports.map(|port| port.number.to_string()).collect();
@@ -289,7 +273,6 @@ fn kinds(description: &Description) -> impl Iterator<Item = (u16, u16, &PointKin
     })
 }
 
-/// Returns the address of a point.
 fn point(port: u16, channel: u16) -> u16 {
     (port.max(1) - 1) * CHANNELS + channel - 1
 }
@@ -308,19 +291,14 @@ fn points(description: &Description, readings: &[(u16, u16)]) -> Vec<Item> {
         items.push(Item {
             name: format!("p{port}.{channel}"),
             table,
-            address,
-            words: 1,
             meaning: match (table, reading) {
                 (Table::Bit, _) => Meaning::Bit,
                 (Table::Word, Some(reading)) => Meaning::Analog(reading.clone()),
                 (Table::Word, None) => Meaning::Unknown,
             },
             writable: kind.writable,
-            setting: false,
-            restart: false,
-            values: None,
-            default: 0,
             about: kind.name.clone(),
+            ..unknown(address)
         });
     }
     items
@@ -383,6 +361,17 @@ fn is_setting(register: &Register) -> bool {
         && !matches!(register.value, Value::Long(_))
 }
 
+/// Returns the names of a unit with this module in every slot, and with this RANGE and SCALE of every point.
+#[cfg(test)]
+pub fn book(
+    board: &register_map::Board,
+    module: register_map::Module,
+    reading: (u16, u16),
+) -> Book {
+    let description = modio_description::describe(board, "0.1.0", |_| module);
+    Book::new(description, vec![reading; 32])
+}
+
 #[cfg(test)]
 mod tests {
     use modio_description::describe;
@@ -392,9 +381,7 @@ mod tests {
     use super::*;
 
     fn book(module: Module) -> Book {
-        let mut readings = vec![(0, 0); 32];
-        readings[0x10] = (1, 1);
-        Book::new(describe(&MODIO_02, "0.1.0", |_| module), readings)
+        super::book(&MODIO_02, module, (1, 1))
     }
 
     #[test]
@@ -414,15 +401,6 @@ mod tests {
         assert_eq!(address("0x0101"), Ok((0x101, 1)));
         assert_eq!(book.find("0x0101").unwrap().name, "BAUD");
         assert_eq!(book.find("4096").unwrap().meaning, Meaning::Unknown);
-    }
-
-    #[test]
-    fn a_register_at_the_last_address_is_found() {
-        let mut unit = describe(&MODIO_02, "0.1.0", |_| Module::None);
-        unit.registers[0].address = 0xFFFF;
-        let book = Book::new(unit, Vec::new());
-        assert_eq!(book.find("0xFFFF").unwrap().address, 0xFFFF);
-        assert_eq!(book.find("0x0000").unwrap().meaning, Meaning::Unknown);
     }
 
     #[test]
@@ -472,10 +450,7 @@ mod tests {
 
     #[test]
     fn a_board_with_more_slots_has_their_points() {
-        let book = Book::new(
-            describe(&MODIO_08, "0.1.0", |_| Module::Do4),
-            vec![(0, 0); 32],
-        );
+        let book = super::book(&MODIO_08, Module::Do4, (0, 0));
         assert_eq!(book.points().count(), 16);
         assert_eq!(book.find("p4.4").unwrap().address, 15);
         assert!(book.find("p5.1").is_err());
@@ -492,5 +467,6 @@ mod tests {
         let book = Book::new(description, Vec::new());
         assert_eq!(book.find("0xFFFF").unwrap().name, "uptime");
         assert_eq!(book.find("0xFFFE").unwrap().meaning, Meaning::Unknown);
+        assert_eq!(book.find("0x0000").unwrap().meaning, Meaning::Unknown);
     }
 }

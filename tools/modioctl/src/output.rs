@@ -1,6 +1,6 @@
 //! Standard output and files. When the reader closes it, as `head` does, the program ends without an error message.
 
-use std::fmt::Arguments;
+use std::fmt::Display;
 use std::fs::File;
 use std::io::{self, ErrorKind, Write, stdout};
 use std::path::Path;
@@ -8,11 +8,7 @@ use std::path::Path;
 use crate::failure::Failure;
 
 /// Prints a line.
-///
-/// # Errors
-///
-/// When the line cannot be written, for example to a full disk.
-pub fn line(text: Arguments<'_>) -> Result<(), Failure> {
+pub fn line(text: impl Display) -> Result<(), Failure> {
     let mut out = stdout().lock();
     match writeln!(out, "{text}").and_then(|()| out.flush()) {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => std::process::exit(0),
@@ -22,20 +18,12 @@ pub fn line(text: Arguments<'_>) -> Result<(), Failure> {
 }
 
 /// Prints a value as JSON.
-///
-/// # Errors
-///
-/// When the output cannot be written.
 pub fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
     let text = serde_json::to_string_pretty(value).map_err(Failure::usage)?;
-    line(format_args!("{text}"))
+    line(text)
 }
 
 /// Prints rows in columns.
-///
-/// # Errors
-///
-/// When the output cannot be written.
 pub fn table<const COLUMNS: usize>(rows: &[[String; COLUMNS]]) -> Result<(), Failure> {
     let mut table = comfy_table::Table::new();
     table.load_preset(comfy_table::presets::NOTHING);
@@ -45,14 +33,10 @@ pub fn table<const COLUMNS: usize>(rows: &[[String; COLUMNS]]) -> Result<(), Fai
     for column in table.column_iter_mut() {
         column.set_padding((0, 2));
     }
-    line(format_args!("{}", table.trim_fmt()))
+    line(table.trim_fmt())
 }
 
 /// Creates a file. Overwrites an existing one only with `force`. A device or a pipe is no existing file.
-///
-/// # Errors
-///
-/// When the file exists or cannot be created.
 pub fn create(path: &Path, force: bool) -> Result<File, Failure> {
     if path.is_file() && !force {
         return Err(Failure::usage(format!(
@@ -64,13 +48,9 @@ pub fn create(path: &Path, force: bool) -> Result<File, Failure> {
 }
 
 /// Writes a text to a file, and reports that on standard error; or prints the text if no file is given.
-///
-/// # Errors
-///
-/// When the file exists, or the text cannot be written.
 pub fn save(text: &str, path: Option<&Path>, force: bool) -> Result<(), Failure> {
     let Some(path) = path else {
-        return line(format_args!("{}", text.trim_end()));
+        return line(text.trim_end());
     };
     let written = create(path, force)?.write_all(text.as_bytes());
     written.map_err(|error| not_written(path, &error))?;
@@ -85,7 +65,6 @@ pub fn not_written(path: &Path, error: &io::Error) -> Failure {
 
 /// Returns a text as a field of a CSV file (RFC 4180). A text that a spreadsheet would calculate gets `'` in front; a
 /// number stays a number.
-#[must_use]
 pub fn csv_field(text: &str) -> String {
     let is_number = text.parse().is_ok_and(f64::is_finite);
     let is_formula = text.len() > 1 && text.starts_with(['=', '+', '-', '@']) && !is_number;

@@ -6,7 +6,6 @@ use crate::bus::adu::{self, Framing};
 use crate::bus::{Direction, Observer, Seen, decode};
 
 /// Returns an observer that prints.
-#[must_use]
 pub fn to_stderr() -> Observer {
     let start = Instant::now();
     let mut request = None;
@@ -19,7 +18,6 @@ pub fn to_stderr() -> Observer {
 }
 
 /// Returns a frame as a line: seconds since `start`, direction, bytes, words.
-#[must_use]
 pub fn line(seen: &Seen, start: Instant, request: Option<&[u8]>) -> String {
     let seconds = seen.at.saturating_duration_since(start).as_secs_f64();
     let frame = frame(seen.direction, seen.framing, &seen.bytes, request);
@@ -27,7 +25,6 @@ pub fn line(seen: &Seen, start: Instant, request: Option<&[u8]>) -> String {
 }
 
 /// Returns a frame as a line: direction, bytes, words. `request` is the PDU of the request before a response.
-#[must_use]
 pub fn frame(
     direction: Direction,
     framing: Framing,

@@ -27,15 +27,13 @@ impl std::fmt::Display for Shown {
 }
 
 /// Formats the words of an item. With `raw` they are shown as numbers without meaning.
-#[must_use]
 pub fn show(item: &Item, words: &[u16], raw: bool) -> Shown {
     let first = words.first().copied().unwrap_or_default();
     match &item.meaning {
         Meaning::Bit if raw => number(first.into(), &Unit::default()),
         Meaning::Bit => Shown {
-            text: if first == 0 { "off" } else { "on" }.to_owned(),
-            unit: String::new(),
             json: json!(first != 0),
+            ..text(if first == 0 { "off" } else { "on" })
         },
         Meaning::Analog(reading) if !raw => number(signed(first, reading.min), &reading.unit),
         Meaning::Value(value) => register(value, words, raw),
@@ -53,7 +51,6 @@ fn signed(word: u16, min: i32) -> i64 {
 }
 
 /// Returns the number in two words, high word first.
-#[must_use]
 pub fn long(words: &[u16]) -> u32 {
     words
         .iter()
@@ -67,36 +64,31 @@ fn register(value: &Value, words: &[u16], raw: bool) -> Shown {
         Value::Number(unit) => number(first.into(), if raw { &plain } else { unit }),
         Value::Long(unit) => number(long(words).into(), if raw { &plain } else { unit }),
         Value::Codes(names) if !raw => match names.iter().find(|(code, _)| *code == first) {
-            Some((_, name)) => text(name.clone()),
+            Some((_, name)) => text(name),
             None => number(first.into(), &plain),
         },
         Value::Bits(names) if !raw => {
-            let is_set = |bit: u8| {
-                first
-                    .checked_shr(bit.into())
-                    .is_some_and(|bits| bits & 1 == 1)
-            };
+            let is_set = |bit: u8| bit < 16 && first >> bit & 1 == 1;
             let set = names.iter().filter(|(bit, _)| is_set(*bit));
             let set: Vec<_> = set.map(|(_, name)| name.as_str()).collect();
+            let shown = set.join(", ");
             Shown {
-                text: if set.is_empty() {
-                    "-".to_owned()
-                } else {
-                    set.join(", ")
-                },
-                unit: String::new(),
                 json: json!(set),
+                ..text(if set.is_empty() { "-" } else { &shown })
             }
         }
         Value::Codes(_) | Value::Bits(_) => number(first.into(), &plain),
-        Value::Opaque => text(words.iter().map(|word| format!("{word:04X}")).collect()),
+        Value::Opaque => {
+            let digits: String = words.iter().map(|word| format!("{word:04X}")).collect();
+            text(&digits)
+        }
     }
 }
 
-fn text(text: String) -> Shown {
+fn text(text: &str) -> Shown {
     Shown {
         json: json!(text),
-        text,
+        text: text.to_owned(),
         unit: String::new(),
     }
 }
@@ -104,10 +96,10 @@ fn text(text: String) -> Shown {
 fn number(number: i64, unit: &Unit) -> Shown {
     let text = decimal(number + i64::from(unit.offset), unit.exponent);
     Shown {
-        json: text.parse::<i64>().map_or_else(
-            |_| json!(text.parse::<f64>().unwrap_or_default()),
-            |whole| json!(whole),
-        ),
+        json: match text.parse::<i64>() {
+            Ok(whole) => json!(whole),
+            Err(_) => json!(text.parse::<f64>().unwrap_or_default()),
+        },
         text,
         unit: unit_name(&unit.code).to_owned(),
     }
@@ -131,7 +123,6 @@ fn decimal(number: i64, exponent: i8) -> String {
 }
 
 /// Returns the name of a UCUM unit for people.
-#[must_use]
 pub fn unit_name(code: &str) -> &str {
     match code {
         "Cel" => "°C",
@@ -141,11 +132,8 @@ pub fn unit_name(code: &str) -> &str {
     }
 }
 
-/// Returns the words for the value in `text`. With `raw` it is a register's number.
-///
-/// # Errors
-///
-/// When the item cannot be written, or the value is not allowed; the error contains the allowed values.
+/// Returns the words for the value in `text`. With `raw` it is a register's number. The error contains the allowed
+/// values.
 pub fn parse(item: &Item, text: &str, raw: bool) -> Result<Vec<u16>, Failure> {
     let name = &item.name;
     if !item.writable {
@@ -187,10 +175,8 @@ fn words(item: &Item, text: &str, raw: bool) -> Result<Vec<u16>, String> {
             let code = named.map(|(code, _)| *code).or(word);
             code.filter(|code| item.allows(*code)).ok_or_else(|| {
                 let takes = names.iter().filter(|(code, _)| item.allows(*code));
-                let takes: Vec<_> = takes
-                    .map(|(code, name)| format!("{code} = {name}"))
-                    .collect();
-                format!("it takes {}", takes.join(", "))
+                let takes = takes.map(|(code, name)| format!("{code} = {name}"));
+                format!("it takes {}", takes.collect::<Vec<_>>().join(", "))
             })?
         }
         Meaning::Value(Value::Number(unit)) => {
@@ -234,10 +220,8 @@ fn check_raw(item: &Item, word: u16) -> Result<(), String> {
 /// steps.
 fn steps(text: &str, unit: &Unit) -> Option<i64> {
     let shown = unit_name(&unit.code);
-    let number = text
-        .trim()
-        .strip_suffix(shown)
-        .or_else(|| text.trim().strip_suffix(&unit.code));
+    let text = text.trim();
+    let number = text.strip_suffix(shown).or(text.strip_suffix(&unit.code));
     let quantity: f64 = number.unwrap_or(text).trim().parse().ok()?;
     let steps = quantity / 10_f64.powi(unit.exponent.into());
     let whole = steps.round();
@@ -246,28 +230,22 @@ fn steps(text: &str, unit: &Unit) -> Option<i64> {
 }
 
 /// Describes the values that a register allows, in its unit.
-#[must_use]
 pub fn takes(values: &Values, unit: &Unit) -> String {
     match values {
         Values::Range(min, max) => range((*min).into(), (*max).into(), unit),
         // The value outside the range has a special meaning, unless it is 0.
-        Values::RangeOr(0, min, max) => {
-            format!("{}, or 0", range((*min).into(), (*max).into(), unit))
-        }
         Values::RangeOr(also, min, max) => {
-            format!(
-                "{}, or {also:#06X}",
-                range((*min).into(), (*max).into(), unit)
-            )
+            let range = range((*min).into(), (*max).into(), unit);
+            match also {
+                0 => format!("{range}, or 0"),
+                also => format!("{range}, or {also:#06X}"),
+            }
         }
         Values::OneOf(values) => {
-            let each = values
-                .iter()
-                .map(|value| number((*value).into(), unit).text);
-            let each: Vec<_> = each.collect();
-            format!("it takes {} {}", each.join(", "), unit_name(&unit.code))
-                .trim_end()
-                .to_owned()
+            let each = values.iter().map(|value| number((*value).into(), unit));
+            let each: Vec<_> = each.map(|shown| shown.text).collect();
+            let takes = format!("it takes {} {}", each.join(", "), unit_name(&unit.code));
+            takes.trim_end().to_owned()
         }
     }
 }
@@ -284,13 +262,11 @@ fn range(min: i64, max: i64, unit: &Unit) -> String {
 }
 
 /// Describes the quantities of a range of numbers, such as `0 to 10000 mV`.
-#[must_use]
 pub fn quantities(min: i64, max: i64, unit: &Unit) -> String {
     format!("{} to {}", number(min, unit).text, number(max, unit))
 }
 
 /// Returns the name of a table, for people.
-#[must_use]
 pub const fn table_name(table: Table) -> &'static str {
     match table {
         Table::Bit => "bit",
@@ -300,18 +276,14 @@ pub const fn table_name(table: Table) -> &'static str {
 
 #[cfg(test)]
 mod tests {
-    use modio_description::describe;
     use register_map::Module;
     use register_map::board::MODIO_02;
 
     use super::*;
-    use crate::names::Book;
+    use crate::names::{self, Book};
 
     fn book(range: u16, scale: u16) -> Book {
-        let mut readings = vec![(0, 0); 32];
-        readings[0x10] = (range, scale);
-        readings[0x12] = (range, scale);
-        Book::new(describe(&MODIO_02, "0.1.0", |_| Module::Ai2Ao2), readings)
+        names::book(&MODIO_02, Module::Ai2Ao2, (range, scale))
     }
 
     fn shown(name: &str, words: &[u16]) -> String {

@@ -3,41 +3,38 @@
 //! After an intended change run `MODIOCTL_WRITE_EXPORTS=1 cargo test -p modioctl --test export`, then check the
 //! differences.
 
+use std::collections::BTreeSet;
 use std::path::Path;
-use std::time::Duration;
 
 use modio_description::{Description, Value, describe};
 use modioctl::bus::adu::Framing;
 use modioctl::bus::{Endpoint, Place};
-use modioctl::export::{ExportFormat, Line, Source, text};
+use modioctl::export::ExportFormat::{self, Csv, HomeAssistant, NodeRed, Telegraf};
+use modioctl::export::{Line, Source, text};
 use modioctl::names::Book;
 use proptest::prelude::*;
 use register_map::Module;
 use register_map::board::{MODIO_02, MODIO_08};
+use serde_json::Value as Json;
 
 const FORMATS: [(ExportFormat, &str); 5] = [
-    (ExportFormat::Csv, "unit.csv"),
+    (Csv, "unit.csv"),
     (ExportFormat::Json, "unit.json"),
-    (ExportFormat::HomeAssistant, "home-assistant.yaml"),
-    (ExportFormat::Telegraf, "telegraf.conf"),
-    (ExportFormat::NodeRed, "node-red.json"),
+    (HomeAssistant, "home-assistant.yaml"),
+    (Telegraf, "telegraf.conf"),
+    (NodeRed, "node-red.json"),
 ];
 
-fn endpoint(place: Place, framing: Framing) -> Endpoint {
-    Endpoint {
-        place,
-        baud: 9600,
-        format: modbus_line::Format::default(),
-        framing,
-        unit: 1,
-        timeout: Duration::from_secs(1),
-        retries: 2,
-        timeout_given: false,
-    }
+fn serial() -> Endpoint {
+    Endpoint::new(Place::Serial("/dev/ttyUSB0".to_owned()), Framing::Rtu)
 }
 
-fn serial() -> Endpoint {
-    endpoint(Place::Serial("/dev/ttyUSB0".to_owned()), Framing::Rtu)
+fn rtu_over_tcp() -> Endpoint {
+    Endpoint::new(Place::Tcp("gateway:4196".to_owned()), Framing::Rtu)
+}
+
+fn modbus_tcp() -> Endpoint {
+    Endpoint::new(Place::ModbusTcp("[::1]:502".to_owned()), Framing::Mbap)
 }
 
 /// A modio-02 with module 2ai2ao in engineering units: NTC, 4-20 mA, 0-10 V and 4-20 mA.
@@ -53,14 +50,17 @@ fn digital() -> Book {
     Book::new(describe(&MODIO_08, "0.1.0", module), vec![(0, 0); 32])
 }
 
-/// A modio-02 with four digital inputs, which count pulses.
-fn inputs() -> Book {
-    let unit = describe(&MODIO_02, "0.1.0", |_| Module::Di4);
-    Book::new(unit, vec![(0, 0); 32])
+/// A modio-02 with this module.
+fn modio_02(module: Module) -> Book {
+    Book::new(describe(&MODIO_02, "0.1.0", |_| module), vec![(0, 0); 32])
 }
 
 fn export(format: ExportFormat, book: &Book, endpoint: &Endpoint) -> Result<String, String> {
     several(format, None, &[(1, book)], endpoint)
+}
+
+fn export_of(format: ExportFormat, book: &Book) -> String {
+    export(format, book, &serial()).unwrap()
 }
 
 fn several(
@@ -85,16 +85,31 @@ fn several(
     text(format, line).map_err(|failure| failure.to_string())
 }
 
-fn yaml(text: &str) -> serde_yaml_ng::Value {
-    serde_yaml_ng::from_str(text).unwrap()
+/// Reads an export.
+fn parsed(format: ExportFormat, text: &str) -> Json {
+    match format {
+        HomeAssistant => serde_yaml_ng::from_str(text).unwrap(),
+        Telegraf => serde_json::to_value(text.parse::<toml::Table>().unwrap()).unwrap(),
+        _ => serde_json::from_str(text).unwrap(),
+    }
 }
 
-fn toml(text: &str) -> toml::Table {
-    text.parse().unwrap()
+/// Returns the list at this place, such as `/modbus/0/sensors`.
+fn list(json: &Json, place: &str) -> Vec<Json> {
+    let list = json.pointer(place).and_then(Json::as_array);
+    list.cloned().unwrap_or_default()
 }
 
-fn nodes(text: &str) -> Vec<serde_json::Value> {
-    serde_json::from_str(text).unwrap()
+/// Returns the parts of a list that have these texts.
+fn with<'a>(list: &'a [Json], texts: &[(&str, &str)]) -> Vec<&'a Json> {
+    let has = |part: &&Json| texts.iter().all(|(key, text)| part[key] == *text);
+    list.iter().filter(has).collect()
+}
+
+/// Returns a text of each part of a list.
+fn texts_of(list: &[Json], key: &str) -> Vec<String> {
+    let text = |part: &Json| part[key].as_str().map(str::to_owned);
+    list.iter().filter_map(text).collect()
 }
 
 #[test]
@@ -113,68 +128,55 @@ fn exports_equal_the_stored_files() {
 
 #[test]
 fn exports_read_back_for_every_board_and_endpoint() {
-    let places = [
-        serial(),
-        endpoint(Place::Tcp("gateway:4196".to_owned()), Framing::Rtu),
-        endpoint(Place::ModbusTcp("[::1]:502".to_owned()), Framing::Mbap),
-    ];
     for book in [analog(), digital()] {
-        for endpoint in &places {
-            let export = |format| export(format, &book, endpoint).unwrap();
-            let json: serde_json::Value =
-                serde_json::from_str(&export(ExportFormat::Json)).unwrap();
-            assert_eq!(json["endpoint"]["unit"], 1);
-            let flow: Vec<serde_json::Value> =
-                serde_json::from_str(&export(ExportFormat::NodeRed)).unwrap();
-            let ids: std::collections::BTreeSet<_> =
-                flow.iter().map(|node| node["id"].to_string()).collect();
+        for endpoint in [serial(), rtu_over_tcp(), modbus_tcp()] {
+            let export = |format| export(format, &book, &endpoint).unwrap();
+            let read = |format| parsed(format, &export(format));
+            assert_eq!(read(ExportFormat::Json)["endpoint"]["unit"], 1);
+            let flow = list(&read(NodeRed), "");
+            let ids: BTreeSet<_> = texts_of(&flow, "id").into_iter().collect();
             assert_eq!(ids.len(), flow.len(), "the ids of nodes differ");
-            let telegraf: toml::Table = export(ExportFormat::Telegraf).parse().unwrap();
-            let fields = &telegraf["inputs"]["modbus"][0]["metric"][0]["fields"];
-            assert!(fields.as_array().unwrap().len() > book.points().count());
-            let yaml: serde_yaml_ng::Value =
-                serde_yaml_ng::from_str(&export(ExportFormat::HomeAssistant)).unwrap();
-            assert!(yaml["modbus"][0]["sensors"].is_sequence());
-            let rows = export(ExportFormat::Csv).lines().count();
-            assert_eq!(rows, book.items().len() + 1);
+            let fields = list(&read(Telegraf), "/inputs/modbus/0/metric/0/fields");
+            assert!(fields.len() > book.points().count());
+            assert!(!list(&read(HomeAssistant), "/modbus/0/sensors").is_empty());
+            assert_eq!(export(Csv).lines().count(), book.items().len() + 1);
         }
     }
 }
 
 #[test]
 fn digital_points_are_switches_and_binary_sensors() {
-    let text = export(ExportFormat::HomeAssistant, &digital(), &serial()).unwrap();
-    let yaml: serde_yaml_ng::Value = serde_yaml_ng::from_str(&text).unwrap();
-    let count = |kind: &str| yaml["modbus"][0][kind].as_sequence().map_or(0, Vec::len);
+    let yaml = parsed(HomeAssistant, &export_of(HomeAssistant, &digital()));
+    let count = |kind: &str| list(&yaml["modbus"][0][kind], "").len();
     assert_eq!((count("binary_sensors"), count("switches")), (4, 12));
     assert!(yaml.get("template").is_none());
 }
 
 #[test]
 fn endpoint_that_a_system_cannot_use_is_rejected() {
-    let ascii = endpoint(Place::Tcp("gateway:4196".to_owned()), Framing::Ascii);
-    for format in [ExportFormat::HomeAssistant, ExportFormat::NodeRed] {
+    let ascii = Endpoint::new(Place::Tcp("gateway:4196".to_owned()), Framing::Ascii);
+    for format in [HomeAssistant, NodeRed] {
         let error = export(format, &analog(), &ascii).unwrap_err();
         assert!(error.contains("ASCII"), "{error}");
     }
-    assert!(export(ExportFormat::Telegraf, &analog(), &ascii).is_ok());
-    let no_port = endpoint(Place::ModbusTcp("gateway".to_owned()), Framing::Mbap);
-    let error = export(ExportFormat::HomeAssistant, &analog(), &no_port).unwrap_err();
+    assert!(export(Telegraf, &analog(), &ascii).is_ok());
+    let no_port = Endpoint::new(Place::ModbusTcp("gateway".to_owned()), Framing::Mbap);
+    let error = export(HomeAssistant, &analog(), &no_port).unwrap_err();
     assert!(error.contains("port"), "{error}");
-    assert!(export(ExportFormat::Csv, &Book::default(), &serial()).is_err());
+    assert!(export(Csv, &Book::default(), &serial()).is_err());
 }
 
 #[test]
 fn units_of_a_line_share_one_hub_client_and_input() {
-    let (analog, digital, inputs) = (analog(), digital(), inputs());
+    let (analog, digital, inputs) = (analog(), digital(), modio_02(Module::Di4));
     let units = [(1, &analog), (2, &digital), (3, &inputs)];
     let export = |format| several(format, Some("Hall 2"), &units, &serial()).unwrap();
+    let read = |format| parsed(format, &export(format));
 
-    let yaml = yaml(&export(ExportFormat::HomeAssistant));
-    assert_eq!(yaml["modbus"].as_sequence().unwrap().len(), 1);
-    let hub = &yaml["modbus"][0];
-    assert_eq!(hub["name"], "hall_2");
-    let inputs = hub["binary_sensors"].as_sequence().unwrap();
+    let yaml = read(HomeAssistant);
+    assert_eq!(list(&yaml, "/modbus").len(), 1);
+    assert_eq!(yaml["modbus"][0]["name"], "hall_2");
+    let inputs = list(&yaml, "/modbus/0/binary_sensors");
     let of = |unit: u8| inputs.iter().filter(|input| input["slave"] == unit).count();
     assert_eq!((of(1), of(2), of(3)), (0, 4, 4));
     assert_eq!(inputs[4]["name"], "Hall 2 modio-02 3 p5.1");
@@ -184,165 +186,106 @@ fn units_of_a_line_share_one_hub_client_and_input() {
     let state = "{{ states('sensor.hall_2_modio_02_1_p5_3') }}";
     assert_eq!(number["state"], state);
 
-    let nodes = nodes(&export(ExportFormat::NodeRed));
-    let of_type = |name: &str| nodes.iter().filter(|node| node["type"] == name).count();
+    let nodes = list(&read(NodeRed), "");
+    let of_type = |name: &str| with(&nodes, &[("type", name)]).len();
     assert_eq!((of_type("modbus-client"), of_type("tab")), (1, 3));
-    let servers = nodes.iter().filter_map(|node| node.get("server"));
-    assert!(servers.clone().count() > 10 && servers.clone().all(|id| id == "hall_2_client"));
-    let ids: std::collections::BTreeSet<_> = nodes.iter().map(|node| node["id"].as_str()).collect();
+    let servers = texts_of(&nodes, "server");
+    assert!(servers.len() > 10 && servers.iter().all(|id| id == "hall_2_client"));
+    let ids: BTreeSet<_> = texts_of(&nodes, "id").into_iter().collect();
     assert_eq!(ids.len(), nodes.len());
-    let coil = |unit: &str| {
-        let is_coil =
-            |node: &&serde_json::Value| node["type"] == "modbus-write" && node["unitid"] == unit;
-        nodes.iter().filter(is_coil).count()
-    };
-    assert_eq!((coil("1"), coil("2"), coil("3")), (2, 12, 0));
+    let coils = |unit| with(&nodes, &[("type", "modbus-write"), ("unitid", unit)]).len();
+    assert_eq!((coils("1"), coils("2"), coils("3")), (2, 12, 0));
 
-    let toml = toml(&export(ExportFormat::Telegraf));
-    let inputs = toml["inputs"]["modbus"].as_array().unwrap();
-    assert_eq!(
-        (inputs.len(), inputs[0]["name"].as_str()),
-        (1, Some("Hall 2"))
-    );
-    let metrics = inputs[0]["metric"].as_array().unwrap();
-    let ids: Vec<_> = metrics
-        .iter()
-        .map(|metric| metric["slave_id"].as_integer().unwrap())
-        .collect();
+    let inputs = list(&read(Telegraf), "/inputs/modbus");
+    assert_eq!(texts_of(&inputs, "name"), ["Hall 2"]);
+    let metrics = list(&inputs[0], "/metric");
+    let ids: Vec<_> = metrics.iter().map(|metric| &metric["slave_id"]).collect();
     assert_eq!(ids, [1, 2, 3]);
-    assert_eq!(metrics[1]["tags"]["board"].as_str(), Some("modio-08"));
+    assert_eq!(metrics[1]["tags"]["board"], "modio-08");
 
-    let rows = export(ExportFormat::Csv);
-    assert!(
-        rows.lines().last().unwrap().ends_with(",Hall 2,3"),
-        "{rows}"
-    );
-    let json: serde_json::Value = serde_json::from_str(&export(ExportFormat::Json)).unwrap();
-    let addresses = [0, 1, 2].map(|n| json[n]["endpoint"]["unit"].as_u64().unwrap());
-    assert_eq!(
-        (addresses, json[2]["line"].as_str()),
-        ([1, 2, 3], Some("Hall 2"))
-    );
+    let rows = export(Csv);
+    assert!(rows.trim_end().ends_with(",Hall 2,3"), "{rows}");
+    let json = read(ExportFormat::Json);
+    let addresses = [0, 1, 2].map(|n| &json[n]["endpoint"]["unit"]);
+    assert_eq!(addresses, [1, 2, 3]);
+    assert_eq!(json[2]["line"], "Hall 2");
 }
 
 #[test]
 fn lines_with_names_have_no_ids_in_common() {
     let ids = |name| {
-        let export = |format| several(format, name, &[(1, &analog())], &serial()).unwrap();
-        let nodes = nodes(&export(ExportFormat::NodeRed));
-        let mut ids: Vec<_> = nodes.iter().map(|node| node["id"].to_string()).collect();
-        let yaml = yaml(&export(ExportFormat::HomeAssistant));
-        let sensors = yaml["modbus"][0]["sensors"].as_sequence().unwrap();
-        ids.extend(
-            sensors
-                .iter()
-                .map(|s| s["unique_id"].as_str().unwrap().to_owned()),
-        );
-        ids.push(yaml["modbus"][0]["name"].as_str().unwrap().to_owned());
-        let toml = toml(&export(ExportFormat::Telegraf));
-        ids.push(toml["inputs"]["modbus"][0]["name"].to_string());
-        ids
+        let read = |format| {
+            let text = several(format, name, &[(1, &analog())], &serial());
+            parsed(format, &text.unwrap())
+        };
+        let hubs = list(&read(HomeAssistant), "/modbus");
+        [
+            texts_of(&list(&read(NodeRed), ""), "id"),
+            texts_of(&list(&hubs[0], "/sensors"), "unique_id"),
+            texts_of(&hubs, "name"),
+            // As JSON, because the hub has the same name.
+            vec![read(Telegraf)["inputs"]["modbus"][0]["name"].to_string()],
+        ]
+        .concat()
     };
     let names = [None, Some("a"), Some("b")];
-    let all: std::collections::BTreeSet<_> = names.into_iter().flat_map(ids).collect();
+    let all: BTreeSet<_> = names.into_iter().flat_map(ids).collect();
     assert_eq!(all.len(), 3 * ids(None).len());
 }
 
 #[test]
 fn pulses_of_inputs_are_counters() {
-    let export = |format| export(format, &inputs(), &serial()).unwrap();
-    let yaml = yaml(&export(ExportFormat::HomeAssistant));
-    let sensors = yaml["modbus"][0]["sensors"].as_sequence().unwrap();
-    let is_counter = |sensor: &&serde_yaml_ng::Value| sensor["state_class"] == "total_increasing";
-    let counters: Vec<_> = sensors.iter().filter(is_counter).collect();
+    let read = |format| parsed(format, &export_of(format, &modio_02(Module::Di4)));
+    let sensors = list(&read(HomeAssistant), "/modbus/0/sensors");
+    let counters = with(&sensors, &[("state_class", "total_increasing")]);
     assert_eq!(counters.len(), 4);
     assert_eq!(counters[1]["name"], "modio-02 1 p5.2.pulses");
     assert_eq!(counters[1]["address"], 0x0322);
     assert_eq!(counters[1]["data_type"], "uint32");
 
-    let nodes = nodes(&export(ExportFormat::NodeRed));
-    let of_type = |node: &&serde_json::Value| node["type"] == "modbus-read" && node["adr"] == "800";
-    let read = nodes.iter().find(of_type).unwrap();
+    let nodes = list(&read(NodeRed), "");
+    let read_node = with(&nodes, &[("type", "modbus-read"), ("adr", "800")])[0];
     assert_eq!(
-        (&read["quantity"], &read["rate"]),
+        (&read_node["quantity"], &read_node["rate"]),
         (&"8".into(), &"10".into())
     );
 
-    let toml = toml(&export(ExportFormat::Telegraf));
-    let fields = toml["inputs"]["modbus"][0]["metric"][0]["fields"]
-        .as_array()
-        .unwrap();
-    let names = fields
-        .iter()
-        .filter(|field| field["name"].as_str().unwrap().ends_with("_pulses"));
-    assert!(
-        names
-            .clone()
-            .all(|field| field["type"].as_str() == Some("UINT32"))
-    );
-    assert_eq!(names.count(), 4);
+    let fields = list(&read(Telegraf), "/inputs/modbus/0/metric/0/fields");
+    let mut pulses = fields.clone();
+    pulses.retain(|field| field["name"].as_str().unwrap().ends_with("_pulses"));
+    assert_eq!(texts_of(&pulses, "type"), ["UINT32"; 4]);
     // Outputs and analog points have registers for pulses, too, which stay at 0.
-    assert!(!export_of(ExportFormat::Telegraf, &analog()).contains("pulses"));
-}
-
-fn export_of(format: ExportFormat, book: &Book) -> String {
-    export(format, book, &serial()).unwrap()
+    assert!(!export_of(Telegraf, &analog()).contains("pulses"));
 }
 
 #[test]
 fn node_red_reads_each_port_with_its_own_request() {
-    let nodes = nodes(&export_of(ExportFormat::NodeRed, &digital()));
-    let coils =
-        |node: &&serde_json::Value| node["type"] == "modbus-read" && node["dataType"] == "Coil";
-    let names: Vec<_> = nodes
-        .iter()
-        .filter(coils)
-        .map(|node| node["name"].as_str())
-        .collect();
-    assert_eq!(
-        names,
-        [
-            Some("p2.1 to p2.4"),
-            Some("p3.1 to p3.4"),
-            Some("p4.1 to p4.4")
-        ]
-    );
+    let nodes = list(&parsed(NodeRed, &export_of(NodeRed, &digital())), "");
+    let coils = with(&nodes, &[("type", "modbus-read"), ("dataType", "Coil")]);
+    let names: Vec<_> = coils.iter().map(|node| &node["name"]).collect();
+    assert_eq!(names, ["p2.1 to p2.4", "p3.1 to p3.4", "p4.1 to p4.4"]);
 }
 
 #[test]
 fn telegraf_reads_inputs_apart_only_where_connections_do_not_collide() {
-    let tcp = endpoint(Place::ModbusTcp("[::1]:502".to_owned()), Framing::Mbap);
     let plugins = |book: &Book, endpoint: &Endpoint| -> Vec<Vec<String>> {
-        let toml = toml(&export(ExportFormat::Telegraf, book, endpoint).unwrap());
-        let names = |plugin: &toml::Value| {
-            let fields = plugin["metric"][0]["fields"].as_array().unwrap();
-            fields
-                .iter()
-                .map(|field| field["name"].as_str().unwrap().to_owned())
-                .collect()
-        };
-        toml["inputs"]["modbus"]
-            .as_array()
-            .unwrap()
+        let toml = parsed(Telegraf, &export(Telegraf, book, endpoint).unwrap());
+        let fields = |plugin| list(plugin, "/metric/0/fields");
+        let plugins = list(&toml, "/inputs/modbus");
+        plugins
             .iter()
-            .map(names)
+            .map(|plugin| texts_of(&fields(plugin), "name"))
             .collect()
     };
     assert_eq!(plugins(&analog(), &serial()).len(), 1);
-    let [rest, inputs] = &plugins(&analog(), &tcp)[..] else {
+    let [rest, inputs] = &plugins(&analog(), &modbus_tcp())[..] else {
         panic!("two plugins");
     };
     assert_eq!(inputs, &["p5_1_celsius", "p5_2_uA"]);
-    assert!(
-        ["p5_3_mV", "status", "uptime_s"]
-            .iter()
-            .all(|name| rest.contains(&(*name).to_owned()))
-    );
-    let outputs = Book::new(
-        describe(&MODIO_02, "0.1.0", |_| Module::Do4),
-        vec![(0, 0); 32],
-    );
-    assert_eq!(plugins(&outputs, &tcp).len(), 1);
+    for name in ["p5_3_mV", "status", "uptime_s"] {
+        assert!(rest.iter().any(|field| field == name), "{name}");
+    }
+    assert_eq!(plugins(&modio_02(Module::Do4), &modbus_tcp()).len(), 1);
 }
 
 #[test]
@@ -354,10 +297,9 @@ fn telegraf_gets_the_device_name_of_ports_from_com10_on() {
         (r"\\.\COM10", r"\\.\COM10"),
         ("/dev/ttyS10", "file:///dev/ttyS10"),
     ] {
-        let endpoint = endpoint(Place::Serial(port.to_owned()), Framing::Rtu);
-        let toml = toml(&export(ExportFormat::Telegraf, &analog(), &endpoint).unwrap());
-        let modbus = &toml["inputs"]["modbus"][0];
-        assert_eq!(modbus["controller"].as_str(), Some(controller));
+        let endpoint = Endpoint::new(Place::Serial(port.to_owned()), Framing::Rtu);
+        let toml = parsed(Telegraf, &export(Telegraf, &analog(), &endpoint).unwrap());
+        assert_eq!(toml["inputs"]["modbus"][0]["controller"], controller);
     }
 }
 
@@ -377,7 +319,6 @@ fn texts() -> impl Strategy<Value = String> {
     prop_oneof![known.prop_map(str::to_owned), ".{1,40}"]
 }
 
-/// Replaces every text of a description.
 fn with_texts(mut unit: Description, texts: &[String]) -> Description {
     let mut texts = texts.iter().cycle().cloned();
     let mut next = || texts.next().unwrap_or_default();
@@ -416,31 +357,23 @@ fn with_texts(mut unit: Description, texts: &[String]) -> Description {
 
 /// Returns the keys of an export with the number of elements of each list; texts are left out.
 fn shape(text: &str, format: ExportFormat) -> String {
-    fn of(value: &serde_json::Value) -> String {
+    fn of(value: &Json) -> String {
+        let of_list = |list: &Vec<Json>| list.iter().map(of).collect::<Vec<_>>().join(",");
         match value {
-            serde_json::Value::Object(map) => {
-                let each = map
-                    .iter()
-                    .map(|(key, value)| format!("{key}:{}", of(value)));
-                format!("{{{}}}", each.collect::<Vec<_>>().join(","))
+            Json::Object(map) => {
+                let keys: Vec<_> = map.keys().collect();
+                format!("{keys:?}[{}]", of_list(&map.values().cloned().collect()))
             }
-            serde_json::Value::Array(list) => {
-                format!("[{}]", list.iter().map(of).collect::<Vec<_>>().join(","))
-            }
+            Json::Array(list) => format!("[{}]", of_list(list)),
             _ => "_".to_owned(),
         }
     }
-    let json = match format {
-        ExportFormat::Csv => {
-            // Every second part is outside of quotes.
-            let outside: String = text.split('"').step_by(2).collect();
-            return outside.chars().filter(|c| ",\n\r".contains(*c)).collect();
-        }
-        ExportFormat::Json | ExportFormat::NodeRed => serde_json::from_str(text).unwrap(),
-        ExportFormat::HomeAssistant => serde_json::to_value(yaml(text)).unwrap(),
-        ExportFormat::Telegraf => serde_json::to_value(toml(text)).unwrap(),
-    };
-    of(&json)
+    if format == Csv {
+        // Every second part is outside of quotes.
+        let outside: String = text.split('"').step_by(2).collect();
+        return outside.chars().filter(|c| ",\n\r".contains(*c)).collect();
+    }
+    of(&parsed(format, text))
 }
 
 proptest! {
@@ -458,7 +391,7 @@ proptest! {
             let harmless = export_of(format, &unit(&["x".to_owned()]));
             let text = export_of(format, &unit(&texts));
             prop_assert_eq!(shape(&text, format), shape(&harmless, format));
-            if matches!(format, ExportFormat::HomeAssistant | ExportFormat::Telegraf) {
+            if matches!(format, HomeAssistant | Telegraf) {
                 let is_evaluated = ["{{ states |", "{%", "${"].iter().any(|code| text.contains(code));
                 prop_assert!(!is_evaluated, "{}", text);
                 let comments = |text: &str| text.lines().filter(|line| line.starts_with('#')).count();
@@ -470,38 +403,22 @@ proptest! {
 
 #[test]
 fn masters_leave_the_silence_of_the_rate_between_frames() {
-    let pauses = |endpoint: &Endpoint| {
-        let export = |format| export(format, &analog(), endpoint).unwrap();
-        let hub = &yaml(&export(ExportFormat::HomeAssistant))["modbus"][0];
-        let nodes = nodes(&export(ExportFormat::NodeRed));
-        let delay = nodes
-            .iter()
-            .find_map(|node| node.get("commandDelay")?.as_u64());
-        let input = &toml(&export(ExportFormat::Telegraf))["inputs"]["modbus"][0];
-        let pause = input
-            .get("workarounds")
-            .map(|w| w["pause_between_requests"].to_string());
-        (hub["message_wait_milliseconds"].as_u64(), delay, pause)
-    };
-    let pause = |millis: u64| Some(format!("\"{millis}ms\""));
-    let at = |place: &str, baud| Endpoint {
-        baud,
-        ..endpoint(Place::Tcp(place.to_owned()), Framing::Rtu)
-    };
-    assert_eq!(
-        pauses(&at("gateway:4196", 9600)),
-        (Some(6), Some(6), pause(6))
-    );
-    assert_eq!(
-        pauses(&at("gateway:4196", 115_200)),
-        (Some(3), Some(3), pause(3))
-    );
-    assert_eq!(pauses(&serial()), (None, Some(6), pause(6)));
-    let slow = Endpoint {
-        baud: 1200,
-        ..serial()
-    };
-    assert_eq!(pauses(&slow), (Some(34), Some(34), pause(34)));
-    let tcp = endpoint(Place::ModbusTcp("[::1]:502".to_owned()), Framing::Mbap);
-    assert_eq!(pauses(&tcp), (None, Some(1), None));
+    let at = |baud, endpoint| Endpoint { baud, ..endpoint };
+    for (endpoint, home_assistant, node_red, telegraf) in [
+        (at(9600, rtu_over_tcp()), Some(6), 6, Some("6ms")),
+        (at(115_200, rtu_over_tcp()), Some(3), 3, Some("3ms")),
+        (serial(), None, 6, Some("6ms")),
+        (at(1200, serial()), Some(34), 34, Some("34ms")),
+        (modbus_tcp(), None, 1, None),
+    ] {
+        let read = |format| parsed(format, &export(format, &analog(), &endpoint).unwrap());
+        let wait = &read(HomeAssistant)["modbus"][0]["message_wait_milliseconds"];
+        assert_eq!(wait.as_u64(), home_assistant, "{endpoint:?}");
+        let nodes = list(&read(NodeRed), "");
+        let delay = nodes.iter().find_map(|node| node.get("commandDelay"));
+        assert_eq!(delay, Some(&node_red.into()), "{endpoint:?}");
+        let workarounds = &read(Telegraf)["inputs"]["modbus"][0]["workarounds"];
+        let pause = workarounds["pause_between_requests"].as_str();
+        assert_eq!(pause, telegraf, "{endpoint:?}");
+    }
 }

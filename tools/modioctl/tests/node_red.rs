@@ -4,7 +4,6 @@
 
 use std::io::Write;
 use std::process::{Command, Stdio};
-use std::time::Duration;
 
 use modio_description::{Unit, describe};
 use modioctl::bus::adu::Framing;
@@ -30,16 +29,7 @@ console.log(JSON.stringify(calls.map(([code, payload]) => {
 "#;
 
 fn flow(book: Book) -> Vec<Json> {
-    let endpoint = Endpoint {
-        place: Place::Serial("/dev/ttyUSB0".to_owned()),
-        baud: 9600,
-        format: modbus_line::Format::default(),
-        framing: Framing::Rtu,
-        unit: 1,
-        timeout: Duration::from_secs(1),
-        retries: 2,
-        timeout_given: false,
-    };
+    let endpoint = Endpoint::new(Place::Serial("/dev/ttyUSB0".to_owned()), Framing::Rtu);
     let line = Line {
         name: None,
         endpoint: &endpoint,

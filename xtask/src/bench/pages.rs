@@ -6,13 +6,11 @@ use std::path::Path;
 use fs_err as fs;
 use serde_json::Value;
 
-/// Reads a file of the repository.
 fn read(path: &str) -> String {
     let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
     fs::read_to_string(root.join(path)).unwrap()
 }
 
-/// The baseline of a board.
 struct Baseline(Value);
 
 impl Baseline {

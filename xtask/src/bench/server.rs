@@ -13,7 +13,6 @@ use serde_json::{Value, json};
 use crate::image::Elf;
 use crate::size::{Source, structures};
 
-/// The server's crate.
 const CRATE: &str = "modbus_server";
 
 /// The structures that a line needs, and their numbers.

@@ -107,7 +107,6 @@ fn texts_of(package: &Package) -> Result<Vec<String>> {
 mod tests {
     use super::*;
 
-    /// Returns a package in a directory with these files.
     fn package(name: &str, license: &str, files: &[(&str, &str)]) -> (tempfile::TempDir, Package) {
         let directory = tempfile::tempdir().unwrap();
         for (name, text) in files {

@@ -56,13 +56,11 @@ impl Fake {
         bench
     }
 
-    /// Runs the suites, with this script as rebot.
     fn suites(&self, rebot: &str) -> Result<()> {
         self.program("python", rebot);
         suites::run(&self.bench(), &self.at("python"))
     }
 
-    /// Runs this script as the conformance suite.
     fn conformance(&self, script: &str) -> Result<()> {
         self.program("conformance", script);
         live::conformance(&self.bench(), Module::Do4, &self.at("conformance"))

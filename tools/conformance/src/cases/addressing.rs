@@ -34,13 +34,11 @@ pub(super) const CASES: &[Case] = &[
 /// address in one bit, and 1, 2 and 247.
 fn others(bench: &Bench<'_>) -> Vec<u8> {
     let unit = bench.unit();
-    let all = bench.endpoint.abilities().exact;
-    (1..=247)
-        .filter(|address| *address != unit)
-        .filter(|address| {
-            all || (address ^ unit).count_ones() == 1 || [1, 2, 247].contains(address)
-        })
-        .collect()
+    let all = bench.exact(true, false);
+    let near = |address: u8| (address ^ unit).count_ones() == 1 || [1, 2, 247].contains(&address);
+    let mut others: Vec<u8> = (1..=247).collect();
+    others.retain(|address| *address != unit && (all || near(*address)));
+    others
 }
 
 fn reserved_addresses(bench: &Bench<'_>) -> Vec<u8> {
@@ -48,11 +46,8 @@ fn reserved_addresses(bench: &Bench<'_>) -> Vec<u8> {
 }
 
 fn silent_to(bench: &mut Bench<'_>, unit: u8, pdu: &[u8]) -> Check {
-    let frame = bench.target.mode.frame(unit, pdu);
-    bench.silence_to(
-        &frame,
-        format!("the frame is for address {unit}, not for {}", bench.unit()),
-    )
+    let why = format!("the frame is for address {unit}, not for {}", bench.unit());
+    bench.silence_of(unit, pdu, why)
 }
 
 fn other_units(bench: &mut Bench<'_>) -> Check {
@@ -72,17 +67,10 @@ fn reserved(bench: &mut Bench<'_>) -> Check {
 }
 
 fn few_others(bench: &Bench<'_>) -> Vec<u8> {
-    let near = [
-        bench.unit() ^ 1,
-        bench.unit() ^ 2,
-        bench.other(),
-        248,
-        254,
-        255,
-    ];
-    near.into_iter()
-        .filter(|address| ![0, bench.unit()].contains(address))
-        .collect()
+    let unit = bench.unit();
+    let mut few = vec![unit ^ 1, unit ^ 2, bench.other(), 248, 254, 255];
+    few.retain(|address| ![0, unit].contains(address));
+    few
 }
 
 fn other_units_write(bench: &mut Bench<'_>) -> Check {
@@ -112,20 +100,17 @@ fn broadcast_bits(bench: &mut Bench<'_>) -> Check {
     let span = bench.bits()?.up_to(1);
     for state in [true, false, true] {
         let value = if state { 0xFF00 } else { 0 };
-        for (function, request) in [
-            (5, pdu(5, span.first, value)),
-            (0x0F, write_bits(span.first, &[state], false)),
+        for request in [
+            pdu(5, span.first, value),
+            write_bits(span.first, &[state], false),
         ] {
-            if !bench.target.has(function) {
+            if !bench.target.has(request[0]) {
                 continue;
             }
             bench.set_bits(span.first, &[!state])?;
             silent_to(bench, 0, &request)?;
-            let now = bench.read_bits(span)?;
-            bench.ensure(
-                now == [state],
-                format!("the broadcast has made the coil {state}"),
-            )?;
+            let wanted = format!("the broadcast has made the coil {state}");
+            bench.bits_are(span, &[state], wanted)?;
         }
     }
     Ok(())
@@ -135,29 +120,18 @@ fn broadcast_words(bench: &mut Bench<'_>) -> Check {
     let words = bench.words()?;
     let at = words.span.first;
     for value in [words.high, words.low] {
-        let other = if value == words.low {
-            words.high
-        } else {
-            words.low
-        };
-        for (function, request) in [
-            (6, pdu(6, at, value)),
-            (0x10, write_words(at, &[value])),
-            (
-                0x16,
-                [pdu(0x16, at, 0), value.to_be_bytes().to_vec()].concat(),
-            ),
+        for request in [
+            pdu(6, at, value),
+            write_words(at, &[value]),
+            [pdu(0x16, at, 0), value.to_be_bytes().to_vec()].concat(),
         ] {
-            if !bench.target.has(function) {
+            if !bench.target.has(request[0]) {
                 continue;
             }
-            bench.set_words(at, &[other])?;
+            bench.set_words(at, &[words.other(value)])?;
             silent_to(bench, 0, &request)?;
-            let now = bench.read_word(at)?;
-            bench.ensure(
-                now == value,
-                format!("the broadcast has made the register {value:04X}"),
-            )?;
+            let wanted = format!("the broadcast has made the register {value:04X}");
+            bench.words_are(words.span.up_to(1), &[value], wanted)?;
         }
     }
     Ok(())
@@ -165,11 +139,8 @@ fn broadcast_words(bench: &mut Bench<'_>) -> Check {
 
 fn broadcast_read(bench: &mut Bench<'_>) -> Check {
     for function in 1..=4 {
-        let first = bench
-            .target
-            .readable(function)
-            .first()
-            .map_or(0, |s| s.first);
+        let readable = bench.target.readable(function);
+        let first = readable.first().map_or(0, |span| span.first);
         silent_to(bench, 0, &pdu(function, first, 1))?;
     }
     for request in [
@@ -205,14 +176,10 @@ fn broadcast_restart(bench: &mut Bench<'_>) -> Check {
     for data in [[0, 0], [0xFF, 0]] {
         let before = count(bench, 0x0B)?;
         silent_to(bench, 0, &diagnose(1, &data))?;
+        let wanted = before.wrapping_add(2);
+        let text = format!("counter 0B goes on to {wanted}, with the broadcast and this request");
         let after = count(bench, 0x0B)?;
-        bench.ensure(
-            after == before.wrapping_add(2),
-            format!(
-                "counter 0B goes on to {}, with the broadcast and this request",
-                before.wrapping_add(2)
-            ),
-        )?;
+        bench.ensure(after == wanted, text)?;
     }
     Ok(())
 }

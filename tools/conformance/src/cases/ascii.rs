@@ -7,6 +7,7 @@ use modbus_line::Parity;
 use crate::bench::{Bench, apart};
 use crate::case::{Case, Check, Need, case};
 use crate::cases::damage::one_by_one;
+use crate::cases::dispatch::with_data;
 use crate::endpoint::Piece;
 use crate::frame::{Reply, ascii, lrc, rtu};
 use crate::points::diagnose;
@@ -63,10 +64,8 @@ fn before_colon(bench: &mut Bench<'_>) -> Check {
 fn colon_restarts(bench: &mut Bench<'_>) -> Check {
     for open in [&b":"[..], b":0", b":0103", b":010300000001"] {
         let frame = [open, &bench.ping()].concat();
-        bench.answers(
-            &[Piece::Bytes(frame)],
-            "a reply to what follows the last colon",
-        )?;
+        let wanted = "a reply to what follows the last colon";
+        bench.answers(&[Piece::Bytes(frame)], wanted)?;
     }
     Ok(())
 }
@@ -91,10 +90,8 @@ fn lower_case(bench: &mut Bench<'_>) -> Check {
     let function = super::dispatch::unknown_function(bench)?;
     let pdu = [function, 0xAB, 0xCD, 0xEF];
     bench.exception(&pdu, 1)?;
-    bench.silence_to(
-        &bench.frame(&pdu).to_ascii_lowercase(),
-        "the digits are in lower case",
-    )?;
+    let lower = bench.frame(&pdu).to_ascii_lowercase();
+    bench.silence_to(&lower, "the digits are in lower case")?;
     bench.alive("a frame in lower case")
 }
 
@@ -122,9 +119,7 @@ fn with_gap(bench: &Bench<'_>, gap: Duration) -> [Piece; 3] {
 }
 
 fn short_gap(bench: &mut Bench<'_>) -> Check {
-    let exact = bench.endpoint.abilities().exact;
-    let longest = if exact { 980 } else { 500 };
-    for ms in [10, 100, longest] {
+    for ms in [10, 100, bench.exact(980, 500)] {
         let pieces = with_gap(bench, Duration::from_millis(ms));
         bench.answers(&pieces, format!("a reply: a gap of {ms} ms is allowed"))?;
     }
@@ -140,16 +135,9 @@ fn long_gap(bench: &mut Bench<'_>) -> Check {
     Ok(())
 }
 
-fn of_length(bench: &Bench<'_>, data: usize) -> (u8, Vec<u8>) {
-    let unknown = super::dispatch::unknown_functions(bench).pop();
-    let function = unknown.unwrap_or(0x6F);
-    let body = [vec![bench.unit(), function], vec![0x33; data]].concat();
-    (function, ascii(&body, lrc(&body)))
-}
-
 fn longest(bench: &mut Bench<'_>) -> Check {
     // Unit, 253 bytes of PDU, LRC: 255 bytes as 510 digits, colon, CR and LF.
-    let (function, frame) = of_length(bench, 252);
+    let (function, frame) = with_data(bench, 252);
     let reply = bench.raw_due(&frame)?;
     bench.ensure(
         frame.len() == 513 && reply.exception(function) == Some(1),
@@ -159,7 +147,7 @@ fn longest(bench: &mut Bench<'_>) -> Check {
 
 fn too_long(bench: &mut Bench<'_>) -> Check {
     for data in [253, 254, 300, 600] {
-        let (_, frame) = of_length(bench, data);
+        let (_, frame) = with_data(bench, data);
         bench.silence_to(&frame, "the frame is too long")?;
         bench.alive("a frame that is too long")?;
     }
@@ -177,22 +165,16 @@ fn rtu_frame(bench: &mut Bench<'_>) -> Check {
 fn delimiter(bench: &mut Bench<'_>) -> Check {
     let change = |to: u8| diagnose(3, &[to, 0]);
     bench.reply_unless_lacking(&change(b'!'), "08/03")?;
-    let with = |bench: &Bench<'_>, pdu: &[u8], end: u8| {
-        let mut frame = bench.frame(pdu);
+    let [new, back] = [bench.ping(), bench.frame(&change(b'\n'))].map(|mut frame| {
         frame.pop();
-        frame.push(end);
+        frame.push(b'!');
         frame
-    };
-    let ping = bench.target.ping.clone();
-    let new = with(bench, &ping, b'!');
+    });
     // The reply may end in either character.
     let answered = bench.raw_due(&new)? != Reply::Silence;
-    let back = with(bench, &change(b'\n'), b'!');
     bench.raw(&back)?;
-    bench.ensure(
-        answered,
-        "a reply to a frame that ends in CR and the new character",
-    )?;
+    let wanted = "a reply to a frame that ends in CR and the new character";
+    bench.ensure(answered, wanted)?;
     bench.alive("the delimiter is LF again")
 }
 

@@ -77,11 +77,8 @@ fn others_truncated(bench: &mut Bench<'_>) -> Check {
 fn others_long(bench: &mut Bench<'_>) -> Check {
     let other = bench.other();
     for words in [1, 2, 60, 123, 124, 125] {
-        let body = [
-            vec![other, 3, words * 2],
-            vec![0x5A; usize::from(words) * 2],
-        ]
-        .concat();
+        let data = vec![0x5A; usize::from(words) * 2];
+        let body = [vec![other, 3, words * 2], data].concat();
         bench.silence_to(&rtu(&body), "the frame is another unit's reply")?;
         bench.alive(format!("another unit's reply of {words} registers"))?;
     }
@@ -130,10 +127,8 @@ fn stray_zero(bench: &mut Bench<'_>) -> Check {
         bench.alive("a stray byte in front of a request")?;
         let silence = bench.endpoint.line().t35_limits().most * 2;
         let apart = apart(stray, silence, &bench.ping());
-        bench.answers(
-            &apart,
-            "a reply: a silence separates the stray byte from the request",
-        )?;
+        let wanted = "a reply: a silence separates the stray byte from the request";
+        bench.answers(&apart, wanted)?;
     }
     Ok(())
 }
@@ -156,11 +151,8 @@ fn echoed(bench: &mut Bench<'_>) -> Check {
     if bench.target.has(8) {
         echoes.push(vec![8, 0, 0, 1, 2]);
     }
-    if let Some(span) = bench
-        .target
-        .bits
-        .filter(|_| bench.target.has(5) && bench.target.has(1))
-    {
+    let reads_and_writes = bench.target.has(5) && bench.target.has(1);
+    if let Some(span) = bench.target.bits.filter(|_| reads_and_writes) {
         let now = bench.read_bits(span.up_to(1))?[0];
         echoes.push(pdu(5, span.first, if now { 0xFF00 } else { 0 }));
     }

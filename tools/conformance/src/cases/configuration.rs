@@ -91,7 +91,7 @@ fn command(bench: &mut Bench<'_>) -> Check {
     for value in [0, 7, 0xB006, 0xFFFF] {
         bench.exception(&pdu(6, configuration::COMMAND, value), 3)?;
     }
-    if bench.allow_config {
+    if bench.target.allow_config {
         bench.unlock()?;
         let clear_flag = Command::ClearWatchdogFlag.code();
         let request = pdu(6, configuration::COMMAND, clear_flag);
@@ -122,18 +122,10 @@ fn response_delay(bench: &mut Bench<'_>) -> Check {
         result = result.and_then(|()| bench.reply_is(&request, &request));
         result = result.and_then(|()| bench.alive("a new RESPONSE_DELAY"));
         let least = bench.endpoint.line().t35_limits().least + Duration::from_millis(u64::from(ms));
-        let first = bench
-            .received
-            .first()
-            .map_or(Duration::ZERO, |received| received.start);
-        let took = first.saturating_sub(bench.sent_end);
-        result = result.and_then(|()| {
-            let right = took >= least && took < least + Duration::from_millis(3);
-            bench.ensure(
-                right,
-                format!("a reply {least:?} after the request, not {took:?}"),
-            )
-        });
+        let took = bench.turnaround();
+        let right = took >= least && took < least + Duration::from_millis(3);
+        let wanted = format!("a reply {least:?} after the request, not {took:?}");
+        result = result.and_then(|()| bench.ensure(right, wanted));
     }
     bench.reply(&pdu(6, configuration::RESPONSE_DELAY, before))?;
     bench.patience = patience;

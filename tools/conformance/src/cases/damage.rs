@@ -74,10 +74,8 @@ fn glitch(bench: &mut Bench<'_>) -> Check {
     for width in [Duration::from_micros(1), bit / 20, bit / 4, bit * 2 / 5] {
         let width = width.max(Duration::from_nanos(100));
         let ping = Piece::Bytes(bench.ping());
-        bench.answers(
-            &[Piece::Glitch(width), apart.clone(), ping],
-            format!("a reply after a glitch of {width:?}"),
-        )?;
+        let wanted = format!("a reply after a glitch of {width:?}");
+        bench.answers(&[Piece::Glitch(width), apart.clone(), ping], wanted)?;
     }
     Ok(())
 }

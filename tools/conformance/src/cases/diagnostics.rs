@@ -72,18 +72,14 @@ fn data_refused(bench: &mut Bench<'_>) -> Check {
             if reply.exception(8) == Some(1) {
                 break;
             }
-            bench.ensure(
-                reply.exception(8) == Some(3),
-                format!("exception 03: 08/{sub:02X} takes 0000 only"),
-            )?;
+            let wanted = format!("exception 03: 08/{sub:02X} takes 0000 only");
+            bench.ensure(reply.exception(8) == Some(3), wanted)?;
         }
         for short in [&[][..], &[0], &[0, 0, 0]] {
             let reply = bench.ask(&diagnose(sub, short))?;
             let right = reply == Reply::Silence || matches!(reply.exception(8), Some(1 | 3));
-            bench.ensure(
-                right,
-                format!("exception 03 or silence: 08/{sub:02X} takes two bytes"),
-            )?;
+            let wanted = format!("exception 03 or silence: 08/{sub:02X} takes two bytes");
+            bench.ensure(right, wanted)?;
         }
     }
     Ok(())
@@ -96,10 +92,8 @@ fn length(bench: &mut Bench<'_>) -> Check {
 
 fn register(bench: &mut Bench<'_>) -> Check {
     let reply = bench.reply_unless_lacking(&diagnose(2, &[0, 0]), "08/02")?;
-    bench.ensure(
-        reply.len() == 5 && reply[..3] == [8, 0, 2],
-        "08 00 02 and two bytes",
-    )
+    let wanted = "08 00 02 and two bytes";
+    bench.ensure(reply.len() == 5 && reply[..3] == [8, 0, 2], wanted)
 }
 
 fn restart(bench: &mut Bench<'_>) -> Check {
@@ -154,8 +148,7 @@ pub(super) fn needs_listen_only(bench: &mut Bench<'_>) -> Check {
 
 /// Puts the unit into listen-only mode.
 pub(super) fn enter(bench: &mut Bench<'_>) -> Check {
-    let enter = bench.frame(&diagnose(4, &[0, 0]));
-    bench.silence_to(&enter, "08/04 is not answered")
+    bench.silence_of(bench.unit(), &diagnose(4, &[0, 0]), "08/04 is not answered")
 }
 
 /// Ends the listen-only mode, also after a failure. Returns that failure, or the failure to end the mode.
@@ -185,8 +178,7 @@ fn listen_only(bench: &mut Bench<'_>) -> Check {
         vec![0x66],
         vec![3, 0, 0, 0, 0],
     ] {
-        let frame = bench.frame(&pdu);
-        silent = silent.and_then(|()| bench.silence_to(&frame, "listen-only mode"));
+        silent = silent.and_then(|()| bench.silence_of(bench.unit(), &pdu, "listen-only mode"));
     }
     leave(bench, silent)
 }
@@ -203,8 +195,7 @@ fn listen_only_writes(bench: &mut Bench<'_>) -> Check {
             vec![5, high, low, 0xFF, 0],
             vec![0x0F, high, low, 0, 1, 1, 1],
         ] {
-            let frame = bench.target.mode.frame(unit, &pdu);
-            tried = tried.and_then(|()| bench.silence_to(&frame, "listen-only mode"));
+            tried = tried.and_then(|()| bench.silence_of(unit, &pdu, "listen-only mode"));
         }
     }
     leave(bench, tried)?;
@@ -216,26 +207,16 @@ fn clear(bench: &mut Bench<'_>) -> Check {
     let reply = bench.reply_unless_lacking(&request, "08/0A")?;
     bench.ensure(reply == request, "the request echoed")?;
     let function = unknown_function(bench)?;
-    // Number of messages by which the requests after the clearing move each counter.
-    for (sub, moved) in [
-        (0x0B, 1),
-        (0x0C, 0),
-        (0x0D, 0),
-        (0x0E, 1),
-        (0x0F, 0),
-        (0x10, 0),
-        (0x11, 0),
-        (0x12, 0),
-        (0x02, 0),
-    ] {
+    // The request after the clearing moves the counters 0B and 0E by one.
+    for sub in (0x0B..=0x12).chain([2]) {
+        let moved = u16::from(matches!(sub, 0x0B | 0x0E));
         // Move every counter that traffic on the line can move.
         for _ in 0..2 {
             bench.alive("a request that clears the counters")?;
             let bad = line_counters::bad(bench);
             bench.silence_to(&bad, "its check is wrong")?;
             bench.exception(&[function], 1)?;
-            let broadcast = bench.target.mode.frame(0, &bench.target.ping);
-            bench.silence_to(&broadcast, "a broadcast")?;
+            bench.silent_ping(0, "a broadcast")?;
         }
         let again = diagnose(0x0A, &[0, 0]);
         bench.reply_is(&again, &again)?;
@@ -248,11 +229,10 @@ fn clear(bench: &mut Bench<'_>) -> Check {
         };
         let value = pdu
             .get(3..5)
-            .map_or(u16::MAX, |word| u16::from_be_bytes([word[0], word[1]]));
-        bench.ensure(
-            value <= moved,
-            format!("08/{sub:02X} is {moved} at most after 08/0A"),
-        )?;
+            .map(|word| u16::from_be_bytes([word[0], word[1]]));
+        let right = value.is_some_and(|value| value <= moved);
+        let wanted = format!("08/{sub:02X} is {moved} at most after 08/0A");
+        bench.ensure(right, wanted)?;
     }
     Ok(())
 }
@@ -262,8 +242,6 @@ fn clear_overruns(bench: &mut Bench<'_>) -> Check {
     let reply = bench.reply_unless_lacking(&request, "08/14")?;
     bench.ensure(reply == request, "the request echoed")?;
     let overruns = bench.reply_unless_lacking(&diagnose(0x12, &[0, 0]), "08/12")?;
-    bench.ensure(
-        overruns == diagnose(0x12, &[0, 0]),
-        "the overrun counter is 0",
-    )
+    let wanted = "the overrun counter is 0";
+    bench.ensure(overruns == diagnose(0x12, &[0, 0]), wanted)
 }

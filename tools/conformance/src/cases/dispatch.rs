@@ -34,6 +34,14 @@ pub(super) fn unknown_function(bench: &Bench<'_>) -> Check<u8> {
     one.ok_or_else(|| Stop::Skip("every function exists".to_owned()))
 }
 
+/// Returns a function that the unit does not have, and a good frame of a request for it with this number of data
+/// bytes.
+pub(super) fn with_data(bench: &Bench<'_>, data: usize) -> (u8, Vec<u8>) {
+    let function = unknown_functions(bench).pop().unwrap_or(0x6F);
+    let pdu = [vec![function], vec![0x33; data]].concat();
+    (function, bench.frame(&pdu))
+}
+
 fn unknown(bench: &mut Bench<'_>) -> Check {
     for function in unknown_functions(bench) {
         bench.exception(&[function], 1)?;
@@ -57,10 +65,8 @@ fn not_functions(bench: &mut Bench<'_>) -> Check {
         for data in [&[][..], &[0, 0, 0, 1], &[2]] {
             let reply = bench.ask(&[&[function], data].concat())?;
             let refused = Reply::Pdu(vec![function | 0x80, 1]);
-            bench.ensure(
-                reply == Reply::Silence || reply == refused,
-                "silence, or exception 01",
-            )?;
+            let right = reply == Reply::Silence || reply == refused;
+            bench.ensure(right, "silence, or exception 01")?;
         }
     }
     bench.alive("invalid function codes")
@@ -69,11 +75,8 @@ fn not_functions(bench: &mut Bench<'_>) -> Check {
 fn elsewhere(bench: &mut Bench<'_>) -> Check {
     let other = bench.other();
     for function in [0x41, 0x65, 0x00, 0x80] {
-        let reply = bench.ask_unit(other, &[function, 1, 2, 3])?;
-        bench.ensure(
-            reply == Reply::Silence,
-            "silence: the request is for another unit",
-        )?;
+        let silent = bench.ask_unit(other, &[function, 1, 2, 3])? == Reply::Silence;
+        bench.ensure(silent, "silence: the request is for another unit")?;
     }
     Ok(())
 }

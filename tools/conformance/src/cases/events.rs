@@ -71,7 +71,6 @@ fn with_data(bench: &mut Bench<'_>, function: u8) -> Check {
     bench.exception_03_or_silence(&[function, 0, 0])
 }
 
-/// Reads the event count.
 fn events(bench: &mut Bench<'_>) -> Check<u16> {
     let reply = bench.reply(&[0x0B])?;
     let [0x0B, status_high, status_low, high, low] = reply[..] else {
@@ -94,10 +93,8 @@ fn counter_counts(bench: &mut Bench<'_>) -> Check {
         bench.alive("the first reading of the count")?;
     }
     let after = events(bench)?;
-    bench.ensure(
-        after == before.wrapping_add(3),
-        format!("three messages done: {}", before.wrapping_add(3)),
-    )?;
+    let wanted = before.wrapping_add(3);
+    bench.ensure(after == wanted, format!("three messages done: {wanted}"))?;
     if let Some(function) = super::dispatch::unknown_functions(bench).pop() {
         bench.exception(&[function], 1)?;
         let same = events(bench)?;
@@ -122,12 +119,8 @@ fn log(bench: &mut Bench<'_>) -> Check<(u16, u16, Vec<u8>)> {
     )?;
     let status = u16::from_be_bytes([s1, s0]);
     bench.ensure(status == 0 || status == 0xFFFF, "a status of 0000 or FFFF")?;
-    let events = events.to_vec();
-    Ok((
-        u16::from_be_bytes([e1, e0]),
-        u16::from_be_bytes([m1, m0]),
-        events,
-    ))
+    let [count, messages] = [[e1, e0], [m1, m0]].map(u16::from_be_bytes);
+    Ok((count, messages, events.to_vec()))
 }
 
 fn log_shape(bench: &mut Bench<'_>) -> Check {
@@ -148,14 +141,10 @@ fn log_counts(bench: &mut Bench<'_>) -> Check {
     let (logged, later, _) = log(bench)?;
     // 6.9 does not define whether 0C counts itself after its reply.
     let more = logged.wrapping_sub(count);
-    bench.ensure(
-        more == 1 || more == 2,
-        "one message more is done, or two with the first 0C",
-    )?;
-    bench.ensure(
-        later == messages.wrapping_add(2),
-        "two messages more, this one included, have come",
-    )
+    let wanted = "one message more is done, or two with the first 0C";
+    bench.ensure(more == 1 || more == 2, wanted)?;
+    let wanted = "two messages more, this one included, have come";
+    bench.ensure(later == messages.wrapping_add(2), wanted)
 }
 
 fn log_order(bench: &mut Bench<'_>) -> Check {
@@ -167,19 +156,15 @@ fn log_order(bench: &mut Bench<'_>) -> Check {
     let sent = |event: &u8| event & 0xC0 == 0x40;
     let skip = usize::from(events.first().is_some_and(receive));
     let right = events.get(skip).is_some_and(sent) && events.get(skip + 1).is_some_and(receive);
-    bench.ensure(
-        right,
-        "the last reply sent (40-7F), and before it its request received (80-FF)",
-    )?;
+    let wanted = "the last reply sent (40-7F), and before it its request received (80-FF)";
+    bench.ensure(right, wanted)?;
     if let Some(function) = super::dispatch::unknown_functions(bench).pop() {
         bench.exception(&[function], 1)?;
         let (_, _, events) = log(bench)?;
         let skip = usize::from(events.first().is_some_and(receive));
         let exception = events.get(skip).is_some_and(|event| event & 0xC1 == 0x41);
-        bench.ensure(
-            exception,
-            "a reply with exception 01 is 41: read exception sent",
-        )?;
+        let wanted = "a reply with exception 01 is 41: read exception sent";
+        bench.ensure(exception, wanted)?;
     }
     Ok(())
 }
@@ -192,10 +177,8 @@ fn log_cleared(bench: &mut Bench<'_>) -> Check {
     bench.ensure(before.len() > 6, "a log of the messages before")?;
     bench.reply_unless_lacking(&diagnose(1, &[0xFF, 0]), "08/01")?;
     let (_, _, events) = log(bench)?;
-    bench.ensure(
-        events.len() <= 4,
-        "no event from before the restart with FF00",
-    )?;
+    let wanted = "no event from before the restart with FF00";
+    bench.ensure(events.len() <= 4, wanted)?;
     bench.ensure(events.contains(&0), "event 00, the restart")
 }
 
@@ -228,15 +211,11 @@ fn logs(
 }
 
 fn log_reply(bench: &mut Bench<'_>) -> Check {
-    logs(
-        bench,
-        "two requests",
-        &[&[0x40, 0x80, 0x40, 0x80]],
-        |bench| {
-            bench.alive("a reading of the log")?;
-            bench.alive("a request")
-        },
-    )
+    let right = [0x40, 0x80, 0x40, 0x80];
+    logs(bench, "two requests", &[&right], |bench| {
+        bench.alive("a reading of the log")?;
+        bench.alive("a request")
+    })
 }
 
 fn log_exceptions(bench: &mut Bench<'_>) -> Check {
@@ -270,23 +249,18 @@ fn log_busy(bench: &mut Bench<'_>) -> Check {
 
 fn log_broadcast(bench: &mut Bench<'_>) -> Check {
     // A broadcast read has no effect on any unit, and no reply.
-    let frame = bench.target.mode.frame(0, &bench.target.ping);
     logs(bench, "a broadcast", &[&[0x40, 0xC0]], |bench| {
-        bench.silence_to(&frame, "a broadcast")
+        bench.silent_ping(0, "a broadcast")
     })
 }
 
 fn log_bad_check(bench: &mut Bench<'_>) -> Check {
     let frame = line_counters::bad(bench);
-    logs(
-        bench,
-        "two frames with a bad check",
-        &[&[0x82, 0x82]],
-        |bench| {
-            bench.silence_to(&frame, "the check is wrong")?;
-            bench.silence_to(&frame, "the check is wrong")
-        },
-    )
+    let what = "two frames with a bad check";
+    logs(bench, what, &[&[0x82, 0x82]], |bench| {
+        bench.silence_to(&frame, "the check is wrong")?;
+        bench.silence_to(&frame, "the check is wrong")
+    })
 }
 
 fn log_bad_character(bench: &mut Bench<'_>) -> Check {
@@ -298,10 +272,9 @@ fn log_bad_character(bench: &mut Bench<'_>) -> Check {
 }
 
 fn log_others(bench: &mut Bench<'_>) -> Check {
-    let frame = bench.target.mode.frame(bench.other(), &bench.target.ping);
     logs(bench, "requests for another unit", &[&[]], |bench| {
-        bench.silence_to(&frame, "the request is for another unit")?;
-        bench.silence_to(&frame, "the request is for another unit")
+        bench.silent_ping(bench.other(), "the request is for another unit")?;
+        bench.silent_ping(bench.other(), "the request is for another unit")
     })
 }
 
@@ -318,11 +291,9 @@ fn log_restart(bench: &mut Bench<'_>) -> Check {
 fn log_listen_only(bench: &mut Bench<'_>) -> Check {
     diagnostics::needs_listen_only(bench)?;
     let ping = bench.target.ping.clone();
+    let why = "in listen-only mode nothing is answered";
     let frames = [
-        (
-            bench.frame(&ping),
-            "in listen-only mode nothing is answered",
-        ),
+        (bench.ping(), why),
         (bench.target.mode.frame(0, &ping), "a broadcast"),
         (line_counters::bad(bench), "the check is wrong"),
     ];

@@ -36,7 +36,6 @@ pub(super) const CASES: &[Case] = &[
 /// A group of records: file, first record and number of records.
 type Group = (u16, u16, u16);
 
-/// Returns a group of a request, with this reference type.
 fn group(reference: u8, (file, record, count): Group) -> Vec<u8> {
     let fields = [file, record, count].map(u16::to_be_bytes);
     [&[reference], fields.as_flattened()].concat()
@@ -54,10 +53,8 @@ fn read(bench: &mut Bench<'_>, groups: &[Group]) -> Check<Vec<Vec<u8>>> {
     let [0x14, count, ref rest @ ..] = reply[..] else {
         return bench.fail("14, a byte count and groups");
     };
-    bench.ensure(
-        rest.len() == usize::from(count),
-        "a byte count equal to the number of bytes",
-    )?;
+    let wanted = "a byte count equal to the number of bytes";
+    bench.ensure(rest.len() == usize::from(count), wanted)?;
     let (mut rest, mut read) = (rest, Vec::new());
     for (_, _, records) in groups {
         let bytes = usize::from(*records) * 2;
@@ -120,10 +117,8 @@ fn longest_reply(bench: &mut Bench<'_>) -> Check {
         &[(1, 0, 62), (1, 0, 62)],
     ] {
         let reply = bench.ask_due(&request(groups))?;
-        bench.ensure(
-            matches!(reply.exception(0x14), Some(2 | 3)),
-            "exception 03 or 02",
-        )?;
+        let wanted = "exception 03 or 02";
+        bench.ensure(matches!(reply.exception(0x14), Some(2 | 3)), wanted)?;
     }
     Ok(())
 }
@@ -148,14 +143,9 @@ fn self_description(bench: &mut Bench<'_>) -> Check {
         Err(error) => return bench.fail(error),
     };
     let crc = bench.read_word(state::DESCRIPTION_CRC)?;
-    bench.ensure(
-        crc.to_be_bytes() == head[2..],
-        "the CRC in the second record",
-    )?;
-    let in_force = bench.read_words(Span {
-        first: state::MODULE_IN_FORCE,
-        last: state::MODULE_IN_FORCE + points::PORTS - 1,
-    })?;
+    let wanted = "the CRC in the second record";
+    bench.ensure(crc.to_be_bytes() == head[2..], wanted)?;
+    let in_force = bench.read_words(Span::of(state::MODULE_IN_FORCE, points::PORTS))?;
     let described = (1..).zip(in_force).all(|(number, code)| {
         let port = unit.ports.iter().find(|port| port.number == number);
         port.map_or(0, |port| port.module) == code
@@ -168,10 +158,8 @@ fn groups(bench: &mut Bench<'_>) -> Check {
     let together = read(bench, &wanted)?;
     for (group, bytes) in wanted.iter().zip(&together) {
         let alone = read(bench, &[*group])?.concat();
-        bench.ensure(
-            alone == *bytes,
-            format!("the same as with other groups: {bytes:02X?}"),
-        )?;
+        let must = format!("the same as with other groups: {bytes:02X?}");
+        bench.ensure(alone == *bytes, must)?;
     }
     Ok(())
 }

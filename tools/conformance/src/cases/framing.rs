@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use crate::bench::{Bench, apart};
 use crate::case::{Case, Check, Need, case};
+use crate::cases::dispatch::with_data;
 use crate::frame::{Reply, rtu};
 
 const N: &[Need] = &[Need::Rtu];
@@ -34,11 +35,7 @@ pub(super) const CASES: &[Case] = &[
 
 /// Returns the bits to invert, one at a time: all bits where time is exact, elsewhere every ninth.
 fn bits(bench: &Bench<'_>, frame: &[u8]) -> Vec<usize> {
-    let step = if bench.endpoint.abilities().exact {
-        1
-    } else {
-        9
-    };
+    let step = bench.exact(1, 9);
     (0..frame.len() * 8).step_by(step).collect()
 }
 
@@ -103,29 +100,19 @@ fn short_noise(bench: &mut Bench<'_>) -> Check {
     Ok(())
 }
 
-/// Returns a request for a function that the unit does not have, in a frame of this length with a good CRC.
-fn of_length(bench: &Bench<'_>, length: usize) -> (u8, Vec<u8>) {
-    let unknown = super::dispatch::unknown_functions(bench).pop();
-    let function = unknown.unwrap_or(0x6F);
-    let body = [vec![bench.unit(), function], vec![0x33; length - 4]].concat();
-    (function, rtu(&body))
-}
-
 fn longest(bench: &mut Bench<'_>) -> Check {
     for length in [255, 256] {
-        let (function, frame) = of_length(bench, length);
-        let reply = bench.raw_due(&frame)?;
-        bench.ensure(
-            reply.exception(function) == Some(1),
-            format!("exception 01: a frame of {length} bytes is valid"),
-        )?;
+        let (function, frame) = with_data(bench, length - 4);
+        let right = bench.raw_due(&frame)?.exception(function) == Some(1);
+        let wanted = format!("exception 01: a frame of {length} bytes is valid");
+        bench.ensure(right, wanted)?;
     }
     Ok(())
 }
 
 fn too_long(bench: &mut Bench<'_>) -> Check {
     for length in [257, 258, 259, 300, 512, 513, 1000] {
-        let (_, frame) = of_length(bench, length);
+        let (_, frame) = with_data(bench, length - 4);
         bench.silence_to(&frame, format!("{length} bytes are too long for a frame"))?;
         bench.alive(format!("{length} bytes"))?;
     }
@@ -136,10 +123,8 @@ fn joined(bench: &mut Bench<'_>) -> Check {
     let ping = bench.ping();
     for length in [1, 2, 7, 248, 249, 256, 257, 300, 512] {
         let bytes = [vec![0x33; length], ping.clone()].concat();
-        bench.silence_to(
-            &bytes,
-            format!("the request follows {length} bytes without a silence"),
-        )?;
+        let why = format!("the request follows {length} bytes without a silence");
+        bench.silence_to(&bytes, why)?;
         bench.alive(format!("{length} bytes and a request"))?;
     }
     Ok(())
@@ -153,15 +138,10 @@ fn truncated(bench: &mut Bench<'_>) -> Check {
     }
     // The second half of a request must not complete the first half.
     let half = ping.len() / 2;
-    let pieces = apart(
-        &ping[..half],
-        bench.endpoint.line().t35_limits().most * 2 + Duration::from_millis(20),
-        &ping[half..],
-    );
-    bench.silence(
-        &pieces,
-        "a silence in the middle makes two frames of the request",
-    )?;
+    let gap = bench.endpoint.line().t35_limits().most * 2 + Duration::from_millis(20);
+    let pieces = apart(&ping[..half], gap, &ping[half..]);
+    let why = "a silence in the middle makes two frames of the request";
+    bench.silence(&pieces, why)?;
     bench.alive("two halves")
 }
 
@@ -184,10 +164,8 @@ fn nothing_else(bench: &mut Bench<'_>) -> Check {
     for _ in 0..10 {
         // A wrong CRC shows any other additional byte, but a 00 after the CRC keeps the CRC right.
         let reply = bench.reply(&ping)?;
-        bench.ensure(
-            reply.len() == length,
-            format!("a PDU of {length} bytes and no byte after its CRC"),
-        )?;
+        let wanted = format!("a PDU of {length} bytes and no byte after its CRC");
+        bench.ensure(reply.len() == length, wanted)?;
         let late = bench.listen_until(usize::MAX)?;
         bench.ensure(late == Reply::Silence, "silence after the reply")?;
     }

@@ -53,10 +53,8 @@ fn below_t15(bench: &mut Bench<'_>) -> Check {
     for index in places(bench) {
         for gap in [t15 / 4, t15 / 2, t15 - margin(bench)] {
             let reply = with_gap(bench, index, gap)?;
-            bench.ensure(
-                bench.is_pong(&reply),
-                format!("a reply: a gap of {gap:?} is below t1.5, {t15:?}"),
-            )?;
+            let wanted = format!("a reply: a gap of {gap:?} is below t1.5, {t15:?}");
+            bench.ensure(bench.is_pong(&reply), wanted)?;
         }
     }
     // A gap after every byte.
@@ -111,10 +109,8 @@ fn above_t35(bench: &mut Bench<'_>) -> Check {
     for index in places(bench) {
         for gap in [t35 + margin(bench), t35 * 2, t35 * 10] {
             let reply = with_gap(bench, index, gap)?;
-            bench.ensure(
-                reply == Reply::Silence,
-                format!("silence: a gap of {gap:?} is above t3.5, {t35:?}"),
-            )?;
+            let wanted = format!("silence: a gap of {gap:?} is above t3.5, {t35:?}");
+            bench.ensure(reply == Reply::Silence, wanted)?;
         }
     }
     bench.alive("frames with gaps")
@@ -149,10 +145,8 @@ fn soon_enough(bench: &mut Bench<'_>) -> Check {
     let mine = bench.ping();
     let others = bench.target.mode.frame(bench.other(), &bench.target.ping);
     for gap in [t35 + margin(bench), t35 * 2] {
-        bench.answers(
-            &apart(&others, gap, &mine),
-            format!("a reply: {gap:?} is above t3.5"),
-        )?;
+        let wanted = format!("a reply: {gap:?} is above t3.5");
+        bench.answers(&apart(&others, gap, &mine), wanted)?;
     }
     Ok(())
 }
@@ -162,10 +156,8 @@ fn after_noise(bench: &mut Bench<'_>) -> Check {
     let mine = bench.ping();
     for length in [1, 2, 3, 8, 100, 255, 256, 257, 600] {
         let noise = vec![0xA7; length];
-        bench.answers(
-            &apart(&noise, gap, &mine),
-            format!("a reply, {gap:?} after {length} bytes of noise"),
-        )?;
+        let wanted = format!("a reply, {gap:?} after {length} bytes of noise");
+        bench.answers(&apart(&noise, gap, &mine), wanted)?;
     }
     Ok(())
 }

@@ -36,11 +36,7 @@ pub(super) const CASES: &[Case] = &[
 
 /// Returns the number of random frames, or bursts of noise: more where the host does not have to wait for them.
 fn many(bench: &Bench<'_>) -> usize {
-    if bench.endpoint.abilities().exact {
-        500
-    } else {
-        60
-    }
+    bench.exact(500, 60)
 }
 
 /// Returns a generator of random numbers, which are the same in every run on the same unit and line. Each `use_of`,
@@ -100,10 +96,8 @@ fn send_odd_frames(bench: &mut Bench<'_>, mut rng: Rng) -> Check {
             Reply::Wrong(..) => false,
             Reply::Pdu(answer) => unit != 0 && answer[0] & 0x7F == pdu[0] & 0x7F,
         };
-        bench.ensure(
-            right,
-            format!("silence, or a reply in good form: frame {n}"),
-        )?;
+        let wanted = format!("silence, or a reply in good form: frame {n}");
+        bench.ensure(right, wanted)?;
         if n % 20 == 19 {
             bench.alive("odd frames")?;
         }
@@ -155,12 +149,10 @@ fn restarts(bench: &mut Bench<'_>) -> Check {
     let counted = f64::from(after.0.saturating_sub(before.0));
     bench.ensure(after.1 == before.1, "the reset cause is unchanged")?;
     // Where time is not exact, the unit may be a simulator that is slower than its clock.
-    let right = after.0 >= before.0
-        && (!bench.endpoint.abilities().exact || (counted - passed).abs() <= 1.5);
-    bench.ensure(
-        right,
-        format!("an uptime that has increased by {passed:.1} s"),
-    )
+    let most = bench.exact(1.5, f64::INFINITY);
+    let right = after.0 >= before.0 && (counted - passed).abs() <= most;
+    let wanted = format!("an uptime that has increased by {passed:.1} s");
+    bench.ensure(right, wanted)
 }
 
 /// Longest time in which a modio turns its driver off and its receiver on after a reply, unless a bit is longer.
@@ -169,10 +161,8 @@ const READY: Duration = Duration::from_micros(10);
 fn no_gaps(bench: &mut Bench<'_>) -> Check {
     let ready = bench.endpoint.line().bits(1).max(READY);
     hundred_requests(bench, |bench| {
-        let end = bench
-            .received
-            .last()
-            .map_or(Duration::ZERO, |received| received.end);
+        let last = bench.received.last();
+        let end = last.map_or(Duration::ZERO, |received| received.end);
         (end + ready).saturating_sub(bench.endpoint.now())
     })
 }
@@ -206,14 +196,14 @@ fn half_written(bench: &mut Bench<'_>) -> Check {
     let slot = bench.target.modio.and_then(|modio| modio.slots().next());
     let at = counters::of_point(slot.map_or(0, |(port, _)| points::first(port)));
     let before = bench.reply(&pdu(3, at, 2))?;
-    for request in [
-        crate::points::write_words(at, &[0]),
-        crate::points::write_words(at + 1, &[0]),
-        crate::points::write_words(at + 1, &[0, 0]),
-        crate::points::write_words(at, &[0, 1]),
-        crate::points::write_words(at, &[0, 0, 0]),
+    for (from, words) in [
+        (at, &[0][..]),
+        (at + 1, &[0]),
+        (at + 1, &[0, 0]),
+        (at, &[0, 1]),
+        (at, &[0, 0, 0]),
     ] {
-        bench.exception(&request, 3)?;
+        bench.exception(&crate::points::write_words(from, words), 3)?;
     }
     let now = bench.reply(&pdu(3, at, 2))?;
     bench.ensure(now == before, "the counter is unchanged")

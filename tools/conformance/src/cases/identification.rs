@@ -24,7 +24,6 @@ pub(super) const CASES: &[Case] = &[
     case("fc2b/length", S, "a request cut short or too long is 03 or silence", N, length).interpretation(),
 ];
 
-/// One reply.
 struct Page {
     conformity: u8,
     /// The next object, if more follow.
@@ -54,10 +53,8 @@ fn page(bench: &mut Bench<'_>, code: u8, object: u8) -> Check<Page> {
     };
     bench.ensure(echoed == code, format!("the read code {code:02X} again"))?;
     let levels = [1, 2, 3, 0x81, 0x82, 0x83];
-    bench.ensure(
-        levels.contains(&conformity),
-        "a conformity level 01-03 or 81-83",
-    )?;
+    let wanted = "a conformity level 01-03 or 81-83";
+    bench.ensure(levels.contains(&conformity), wanted)?;
     bench.ensure(reply.len() <= 253, "a PDU of at most 253 bytes")?;
     let (mut objects, mut rest) = (Vec::new(), rest);
     while let [id, length, tail @ ..] = rest {
@@ -90,10 +87,8 @@ fn stream(bench: &mut Bench<'_>, code: u8, first: u8) -> Check<Vec<(u8, Vec<u8>)
     let (mut all, mut from) = (Vec::new(), first);
     loop {
         let page = page(bench, code, from)?;
-        bench.ensure(
-            !page.objects.is_empty(),
-            "at least one object in each reply of a stream",
-        )?;
+        let wanted = "at least one object in each reply of a stream";
+        bench.ensure(!page.objects.is_empty(), wanted)?;
         all.extend(page.objects);
         let in_order = all.is_sorted_by(|a: &(u8, Vec<u8>), b| a.0 < b.0);
         bench.ensure(in_order, "objects in ascending order, none twice")?;
@@ -113,10 +108,8 @@ fn ids(objects: &[(u8, Vec<u8>)]) -> Vec<u8> {
 fn basic(bench: &mut Bench<'_>) -> Check {
     let objects = stream(bench, 1, 0)?;
     bench.ensure(ids(&objects) == [0, 1, 2], "the objects 00, 01 and 02")?;
-    bench.ensure(
-        objects.iter().all(|object| object.1.is_ascii()),
-        "vendor, product code and revision as ASCII",
-    )
+    let wanted = "vendor, product code and revision as ASCII";
+    bench.ensure(objects.iter().all(|object| object.1.is_ascii()), wanted)
 }
 
 fn regular(bench: &mut Bench<'_>) -> Check {
@@ -141,10 +134,8 @@ fn extended(bench: &mut Bench<'_>) -> Check {
     let objects = ids(&stream(bench, 3, 0)?);
     bench.ensure(objects.starts_with(&[0, 1, 2]), "the basic objects first")?;
     let has = objects.iter().any(|id| *id >= 0x80);
-    bench.ensure(
-        has || level < 3,
-        "objects from 80 on, as a device of the extended level has them",
-    )
+    let wanted = "objects from 80 on, as a device of the extended level has them";
+    bench.ensure(has || level < 3, wanted)
 }
 
 fn needs_individual_access(bench: &mut Bench<'_>) -> Check {
@@ -158,10 +149,8 @@ fn individual(bench: &mut Bench<'_>) -> Check {
     needs_individual_access(bench)?;
     for (id, value) in stream(bench, 3, 0)? {
         let one = page(bench, 4, id)?;
-        bench.ensure(
-            one.objects == [(id, value)],
-            format!("only object {id:02X}, with the same value as in the stream"),
-        )?;
+        let wanted = format!("only object {id:02X}, with the same value as in the stream");
+        bench.ensure(one.objects == [(id, value)], wanted)?;
     }
     Ok(())
 }

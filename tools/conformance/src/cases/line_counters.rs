@@ -54,16 +54,12 @@ fn moves(
     done(bench)?;
     let after = count(bench, sub)?;
     let moved = after.wrapping_sub(before);
-    bench.ensure(
-        moved == wanted,
-        format!("counter {sub:02X} has moved by {wanted} ({what}), not by {moved}"),
-    )
+    let must = format!("counter {sub:02X} has moved by {wanted} ({what}), not by {moved}");
+    bench.ensure(moved == wanted, must)
 }
 
 fn ping_other(bench: &mut Bench<'_>) -> Check {
-    let (other, ping) = (bench.other(), bench.target.ping.clone());
-    let frame = bench.target.mode.frame(other, &ping);
-    bench.silence_to(&frame, "another unit's request")
+    bench.silent_ping(bench.other(), "another unit's request")
 }
 
 /// Sends a broadcast that the unit refuses in silence, and that writes nothing.
@@ -79,8 +75,7 @@ fn refused_broadcast(bench: &mut Bench<'_>) -> Check {
     if function == 0x10 {
         request = crate::points::write_words(nowhere, &[0]);
     }
-    let frame = bench.target.mode.frame(0, &request);
-    bench.silence_to(&frame, "a broadcast")
+    bench.silence_of(0, &request, "a broadcast")
 }
 
 /// Returns a request whose check is wrong.
@@ -93,21 +88,16 @@ pub(super) fn bad(bench: &Bench<'_>) -> Vec<u8> {
 }
 
 fn bus_messages(bench: &mut Bench<'_>) -> Check {
-    moves(
-        bench,
-        0x0B,
-        6,
-        "2 for this unit, 3 for another, 1 to read it",
-        |bench| {
-            for _ in 0..3 {
-                ping_other(bench)?;
-            }
-            bench.alive("others' requests")?;
-            let frame = bad(bench);
-            bench.silence_to(&frame, "the check is wrong")?;
-            bench.alive("a frame with a wrong check")
-        },
-    )
+    let what = "2 for this unit, 3 for another, 1 to read it";
+    moves(bench, 0x0B, 6, what, |bench| {
+        for _ in 0..3 {
+            ping_other(bench)?;
+        }
+        bench.alive("others' requests")?;
+        let frame = bad(bench);
+        bench.silence_to(&frame, "the check is wrong")?;
+        bench.alive("a frame with a wrong check")
+    })
 }
 
 fn bus_errors(bench: &mut Bench<'_>) -> Check {
@@ -129,17 +119,11 @@ fn short_frames(bench: &mut Bench<'_>) -> Check {
 }
 
 fn damaged_characters(bench: &mut Bench<'_>) -> Check {
-    moves(
-        bench,
-        0x0C,
-        1,
-        "1 frame with a damaged character",
-        |bench| {
-            let frame = bench.ping();
-            let pieces = damaged_at(&frame, 2, Piece::BadStop);
-            bench.silence(&pieces, "a stop bit is low")
-        },
-    )
+    let what = "1 frame with a damaged character";
+    moves(bench, 0x0C, 1, what, |bench| {
+        let pieces = damaged_at(&bench.ping(), 2, Piece::BadStop);
+        bench.silence(&pieces, "a stop bit is low")
+    })
 }
 
 fn exceptions(bench: &mut Bench<'_>) -> Check {
@@ -150,13 +134,8 @@ fn exceptions(bench: &mut Bench<'_>) -> Check {
         ping_other(bench)?;
         bench.alive("exceptions")
     })?;
-    moves(
-        bench,
-        0x0D,
-        1,
-        "1 broadcast that is refused",
-        refused_broadcast,
-    )
+    let what = "1 broadcast that is refused";
+    moves(bench, 0x0D, 1, what, refused_broadcast)
 }
 
 fn unit_messages(bench: &mut Bench<'_>) -> Check {
@@ -167,13 +146,8 @@ fn unit_messages(bench: &mut Bench<'_>) -> Check {
         let frame = bad(bench);
         bench.silence_to(&frame, "the check is wrong")
     })?;
-    moves(
-        bench,
-        0x0E,
-        2,
-        "1 broadcast and 1 to read it",
-        refused_broadcast,
-    )
+    let what = "1 broadcast and 1 to read it";
+    moves(bench, 0x0E, 2, what, refused_broadcast)
 }
 
 fn no_response(bench: &mut Bench<'_>) -> Check {
@@ -214,12 +188,10 @@ fn registers(bench: &mut Bench<'_>) -> Check {
         let by_register = bench.read_word(register)?;
         // A request to read moves the counters 0B and 0E by one.
         let moved = u16::from(matches!(sub, 0x0B | 0x0E));
-        bench.ensure(
-            by_register == by_function.wrapping_add(moved),
-            format!(
-                "register {register:04X} is the counter 08/{sub:02X}: {by_function} and {moved}"
-            ),
-        )?;
+        let wanted = format!(
+            "register {register:04X} is the counter 08/{sub:02X}: {by_function} and {moved}"
+        );
+        bench.ensure(by_register == by_function.wrapping_add(moved), wanted)?;
     }
     let reply = bench.reply(&pdu(3, state::BUS_MESSAGES, 8))?;
     bench.ensure(reply.len() == 18, "eight registers")

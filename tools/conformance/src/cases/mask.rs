@@ -54,20 +54,14 @@ fn formula(bench: &mut Bench<'_>) -> Check {
             let request = mask(at, and, or);
             bench.reply_is(&request, &request)?;
             let wanted = (from & and) | (or & !and);
-            let now = bench.read_word(at)?;
-            bench.ensure(
-                now == wanted,
-                format!("{from:04X} with AND {and:04X}, OR {or:04X} becomes {wanted:04X}"),
-            )?;
+            let text = format!("{from:04X} with AND {and:04X}, OR {or:04X} becomes {wanted:04X}");
+            bench.words_are(Span::one(at), &[wanted], text)?;
         }
         bench.set_words(at, &[from])?;
         let keep = mask(at, 0xFFFF, 0xFFFF);
         bench.reply_is(&keep, &keep)?;
-        let now = bench.read_word(at)?;
-        bench.ensure(
-            now == from,
-            format!("AND FFFF keeps {from:04X}, whatever OR is"),
-        )?;
+        let text = format!("AND FFFF keeps {from:04X}, whatever OR is");
+        bench.words_are(Span::one(at), &[from], text)?;
     }
     Ok(())
 }
@@ -129,17 +123,11 @@ fn two_places(bench: &mut Bench<'_>) -> Check {
     }
     let (first, second) = (words.span.first, words.span.first + 1);
     bench.set_words(first, &[words.low, words.low])?;
-    let at = |address| Span::one(address);
-    let reply = bench.reply(&both(at(first), second, &[words.high]))?;
-    bench.ensure(
-        words_of(&reply) == [words.low],
-        "the value of the first register from before",
-    )?;
-    let now = bench.read_words(words.span.up_to(2))?;
-    bench.ensure(
-        now == [words.low, words.high],
-        "only the second register is written",
-    )
+    let reply = bench.reply(&both(Span::one(first), second, &[words.high]))?;
+    let same = words_of(&reply) == [words.low];
+    bench.ensure(same, "the value of the first register from before")?;
+    let wanted = "only the second register is written";
+    bench.words_are(words.span.up_to(2), &[words.low, words.high], wanted)
 }
 
 fn quantities(bench: &mut Bench<'_>) -> Check {
@@ -171,45 +159,32 @@ fn quantities_most(bench: &mut Bench<'_>) -> Check {
     let run = bench.target.longest(3).filter(|run| run.len() >= 125);
     let (Some(wide), Some(run)) = (wide.filter(|_| bench.target.has(3)), run) else {
         let nowhere = bench.nowhere(3)?;
-        let read = Span {
-            first: nowhere.saturating_sub(124),
-            last: nowhere.saturating_sub(124) + 124,
-        };
+        let read = Span::of(nowhere.saturating_sub(124), 125);
         return bench.exception(&both(read, read.first, &[0; 121]), 2);
     };
     // Write the values that the registers already have.
     let values = bench.read_words(wide.up_to(121))?;
     let reply = bench.reply(&both(run.up_to(125), wide.first, &values))?;
-    bench.ensure(
-        reply.len() == 252 && reply[1] == 250,
-        "250 data bytes and the byte count 250",
-    )?;
-    let now = bench.read_words(wide.up_to(121))?;
-    bench.ensure(now == values, "the registers hold what was written")
+    let must = "250 data bytes and the byte count 250";
+    bench.ensure(reply.len() == 252 && reply[1] == 250, must)?;
+    let wanted = "the registers hold what was written";
+    bench.words_are(wide.up_to(121), &values, wanted)
 }
 
 fn quantity_first(bench: &mut Bench<'_>) -> Check {
     let nowhere = bench.nowhere(3)?;
     let good = both(Span::one(nowhere), nowhere, &[0]);
-    let with = |changes: &[(usize, u8)]| {
-        let mut request = good.clone();
-        for (at, byte) in changes {
-            request[*at] = *byte;
-        }
-        request
-    };
-    for (changes, wrong) in [
-        (&[(4, 0)][..], "it reads 0 registers"),
-        (&[(4, 126)], "it reads 126 registers"),
-        (&[(8, 0)], "it writes 0 registers"),
-        (&[(8, 122)], "it writes 122 registers"),
-        (&[(8, 2)], "its byte count is 2 for 2 registers"),
+    for (at, byte, wrong) in [
+        (4, 0, "it reads 0 registers"),
+        (4, 126, "it reads 126 registers"),
+        (8, 0, "it writes 0 registers"),
+        (8, 122, "it writes 122 registers"),
+        (8, 2, "its byte count is 2 for 2 registers"),
     ] {
-        let reply = bench.ask_due(&with(changes))?;
-        bench.ensure(
-            reply.exception(0x17) == Some(3),
-            format!("exception 03 to function 17: {wrong}"),
-        )?;
+        let mut request = good.clone();
+        request[at] = byte;
+        let right = bench.ask_due(&request)?.exception(0x17) == Some(3);
+        bench.ensure(right, format!("exception 03 to function 17: {wrong}"))?;
     }
     bench.exception(&good, 2)
 }

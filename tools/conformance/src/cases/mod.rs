@@ -29,7 +29,6 @@ use crate::case::Case;
 
 /// Returns every case, in the order in which they run. Cases that reset counters are late, and cases that restart the
 /// unit are last.
-#[must_use]
 pub fn all() -> Vec<Case> {
     [
         read::FC01,

@@ -65,19 +65,11 @@ fn inputs(bench: &mut Bench<'_>) -> Check {
 }
 
 fn read(bench: &mut Bench<'_>, function: u8, address: u16) -> Check<u16> {
-    if function == 3 {
-        return bench.read_word(address);
-    }
-    let one = Span::one(address);
-    Ok(u16::from(bench.read_bits(one)?[0]))
+    Ok(read_all(bench, function, Span::one(address))?[0])
 }
 
 fn write(bench: &mut Bench<'_>, function: u8, address: u16, value: u16) -> Check {
-    if function == 3 {
-        bench.set_words(address, &[value])
-    } else {
-        bench.set_bits(address, &[value != 0])
-    }
+    write_all(bench, function, address, &[value])
 }
 
 fn set(bench: &mut Bench<'_>, register: u16, value: u16) -> Check {
@@ -88,11 +80,7 @@ fn set(bench: &mut Bench<'_>, register: u16, value: u16) -> Check {
 
 /// COMM_TIMEOUT in tenths of a second. Where time is not exact it is longer, so that a busy host does not exceed it.
 fn tenths(bench: &Bench<'_>, exact: u16) -> u16 {
-    if bench.endpoint.abilities().exact {
-        exact
-    } else {
-        exact * 4
-    }
+    bench.exact(exact, exact * 4)
 }
 
 /// Calls `done` with COMM_TIMEOUT set and SAFE of the output at 0, and restores both.
@@ -114,29 +102,33 @@ fn with_timeout(
     result
 }
 
+fn has_tripped(bench: &mut Bench<'_>) -> Check<bool> {
+    Ok(bench.read_word(state::STATUS)? & state::status::COMM_WATCHDOG != 0)
+}
+
 fn line_dies(bench: &mut Bench<'_>) -> Check {
     let (function, address, high) = output(bench)?;
     let before = read(bench, function, address)?;
     let tenths = tenths(bench, 5);
     let result = with_timeout(bench, tenths, address, |bench, timeout| {
         let (function, address, high) = output(bench)?;
+        let is = |bench: &mut Bench<'_>, value, wanted: &str| {
+            let now = read(bench, function, address)?;
+            bench.ensure(now == value, wanted)
+        };
         write(bench, function, address, high)?;
-        let now = read(bench, function, address)?;
-        bench.ensure(now == high, "the output as written")?;
+        is(bench, high, "the output as written")?;
         bench.rest(timeout * 2)?;
-        let now = read(bench, function, address)?;
-        bench.ensure(now == 0, "the output at SAFE, 0")?;
-        let tripped = bench.read_word(state::STATUS)? & state::status::COMM_WATCHDOG;
-        bench.ensure(tripped != 0, "status bit 0 set: the watchdog has tripped")?;
+        is(bench, 0, "the output at SAFE, 0")?;
+        let tripped = has_tripped(bench)?;
+        bench.ensure(tripped, "status bit 0 set: the watchdog has tripped")?;
         // Requests end the timeout, but do not restore the outputs.
-        let now = read(bench, function, address)?;
-        bench.ensure(now == 0, "the output at SAFE until it is written")?;
+        is(bench, 0, "the output at SAFE until it is written")?;
         write(bench, function, address, high)?;
-        let now = read(bench, function, address)?;
-        bench.ensure(now == high, "the output as written again")?;
+        is(bench, high, "the output as written again")?;
         set(bench, configuration::COMMAND, 5)?;
-        let tripped = bench.read_word(state::STATUS)? & state::status::COMM_WATCHDOG;
-        bench.ensure(tripped == 0, "status bit 0 clear after COMMAND 5")
+        let tripped = has_tripped(bench)?;
+        bench.ensure(!tripped, "status bit 0 clear after COMMAND 5")
     });
     write(bench, function, address, before.min(high))?;
     result
@@ -155,13 +147,12 @@ fn line_lives(bench: &mut Bench<'_>) -> Check {
             bench.ensure(now == high, "the output as written")?;
         }
         // Every unit ignores a broadcast read, but it is a valid message and restarts the timeout.
-        let broadcast = bench.target.mode.frame(0, &bench.target.ping);
         for _ in 0..8 {
             bench.rest(timeout / 4)?;
-            bench.silence_to(&broadcast, "a broadcast")?;
+            bench.silent_ping(0, "a broadcast")?;
         }
-        let tripped = bench.read_word(state::STATUS)? & state::status::COMM_WATCHDOG;
-        bench.ensure(tripped == 0, "status bit 0 clear: broadcasts count")?;
+        let tripped = has_tripped(bench)?;
+        bench.ensure(!tripped, "status bit 0 clear: broadcasts count")?;
         let now = read(bench, function, address)?;
         bench.ensure(now == high, "the output as written")
     });
@@ -169,7 +160,6 @@ fn line_lives(bench: &mut Bench<'_>) -> Check {
     result
 }
 
-/// Reads the outputs of one kind by `function`.
 fn read_all(bench: &mut Bench<'_>, function: u8, span: Span) -> Check<Vec<u16>> {
     if function == 3 {
         return bench.read_words(span);
@@ -241,10 +231,8 @@ fn reads_around_the_end(bench: &mut Bench<'_>, timeout: Duration) -> Check {
         let values = read_all(bench, function, span)?;
         held += u32::from(values == high);
         safe += u32::from(values == low);
-        bench.ensure(
-            values == high || values == low,
-            "every output as written, or every output at SAFE",
-        )?;
+        let wanted = "every output as written, or every output at SAFE";
+        bench.ensure(values == high || values == low, wanted)?;
     }
     // If the watchdog trips in none or in all of the reads, no read was near the end of the timeout.
     bench.ensure(
@@ -261,10 +249,8 @@ fn start_value(bench: &mut Bench<'_>) -> Check {
     }
     let before = read(bench, function, address)?;
     write(bench, function, address, if start == 0 { high } else { 0 })?;
-    bench.endpoint.set_power(false)?;
-    bench.rest(Duration::from_millis(200))?;
-    bench.endpoint.set_power(true)?;
-    bench.rest(Duration::from_secs(1))?;
+    super::power::cycle(bench)?;
+    bench.rest(super::power::START)?;
     let now = read(bench, function, address)?;
     bench.ensure(now == start, format!("the output at START, {start}"))?;
     write(bench, function, address, before)

@@ -18,9 +18,9 @@ pub(super) const CASES: &[Case] = &[
 ];
 
 const OFF: Duration = Duration::from_millis(200);
-const START: Duration = Duration::from_secs(1);
+pub(super) const START: Duration = Duration::from_secs(1);
 
-fn cycle(bench: &mut Bench<'_>) -> Check {
+pub(super) fn cycle(bench: &mut Bench<'_>) -> Check {
     bench.endpoint.set_power(false)?;
     bench.rest(OFF)?;
     bench.endpoint.set_power(true)?;
@@ -43,10 +43,8 @@ fn mid_traffic(bench: &mut Bench<'_>) -> Check {
     for byte in [0x55, 0x00, 0xFF] {
         cycle(bench)?;
         let bytes = [vec![byte; length], bench.ping()].concat();
-        bench.silence(
-            &[Piece::Bytes(bytes)],
-            "no silence has come before the request",
-        )?;
+        let wanted = "no silence has come before the request";
+        bench.silence(&[Piece::Bytes(bytes)], wanted)?;
         bench.alive("the first silence")?;
     }
     Ok(())
@@ -55,8 +53,6 @@ fn mid_traffic(bench: &mut Bench<'_>) -> Check {
 fn no_byte(bench: &mut Bench<'_>) -> Check {
     cycle(bench)?;
     let received = bench.endpoint.receive(START, START, usize::MAX)?;
-    bench.ensure(
-        received.is_empty(),
-        format!("silence while the unit starts: {received:?}"),
-    )
+    let wanted = format!("silence while the unit starts: {received:?}");
+    bench.ensure(received.is_empty(), wanted)
 }

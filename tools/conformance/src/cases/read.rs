@@ -9,7 +9,6 @@ const fn most(function: u8) -> u16 {
     if function <= 2 { 2000 } else { 125 }
 }
 
-/// Returns the number of data bytes of a reply.
 fn data_bytes(function: u8, quantity: u16) -> usize {
     if function <= 2 {
         usize::from(quantity).div_ceil(8)
@@ -18,67 +17,32 @@ fn data_bytes(function: u8, quantity: u16) -> usize {
     }
 }
 
+#[rustfmt::skip]
 macro_rules! reading {
-    ($f:literal, $name:literal, $section:literal) => {
-        [
-            case(
-                concat!($name, "/quantity-0"),
-                $section,
-                "a quantity of 0 is exception 03",
-                &[Need::Function($f)],
-                quantity_0::<$f>,
-            ),
-            case(
-                concat!($name, "/quantity-above-most"),
-                $section,
-                "a quantity above 2000 bits or 125 words is exception 03, up to FFFF",
-                &[Need::Function($f)],
-                quantity_above::<$f>,
-            ),
-            case(
-                concat!($name, "/quantity-most"),
-                $section,
-                "2000 bits or 125 words are in range: 250 data bytes, or 02 where there are not so many",
-                &[Need::Function($f)],
-                quantity_most::<$f>,
-            ),
-            case(
-                concat!($name, "/byte-count"),
-                $section,
-                "every quantity gives its number of bytes, the bits beyond it zero",
-                &[Need::Function($f), Need::Readable($f)],
-                byte_count::<$f>,
-            ),
-            case(
-                concat!($name, "/one-past-the-end"),
-                $section,
-                "a range that reaches one address past the end of a run is exception 02",
-                &[Need::Function($f), Need::Readable($f)],
-                one_past::<$f>,
-            ),
-            case(
-                concat!($name, "/no-wrap"),
-                $section,
-                "address FFFF with quantity 2 is exception 02: addresses do not wrap",
-                &[Need::Function($f)],
-                no_wrap::<$f>,
-            ),
-            case(
-                concat!($name, "/quantity-before-address"),
-                $section,
-                "a bad quantity at a bad address is exception 03, not 02",
-                &[Need::Function($f)],
-                quantity_first::<$f>,
-            ),
-            case(
-                concat!($name, "/length"),
-                $section,
-                "a request a byte short or long under a good check is 03 or silence, never data",
-                &[Need::Function($f), Need::Readable($f)],
-                length::<$f>,
-            ).interpretation(),
-        ]
-    };
+    ($f:literal, $name:literal, $section:literal) => { [
+        case(concat!($name, "/quantity-0"), $section, "a quantity of 0 is exception 03", &[Need::Function($f)],
+            quantity_0::<$f>),
+        case(concat!($name, "/quantity-above-most"), $section,
+            "a quantity above 2000 bits or 125 words is exception 03, up to FFFF", &[Need::Function($f)],
+            quantity_above::<$f>),
+        case(concat!($name, "/quantity-most"), $section,
+            "2000 bits or 125 words are in range: 250 data bytes, or 02 where there are not so many",
+            &[Need::Function($f)], quantity_most::<$f>),
+        case(concat!($name, "/byte-count"), $section,
+            "every quantity gives its number of bytes, the bits beyond it zero",
+            &[Need::Function($f), Need::Readable($f)], byte_count::<$f>),
+        case(concat!($name, "/one-past-the-end"), $section,
+            "a range that reaches one address past the end of a run is exception 02",
+            &[Need::Function($f), Need::Readable($f)], one_past::<$f>),
+        case(concat!($name, "/no-wrap"), $section,
+            "address FFFF with quantity 2 is exception 02: addresses do not wrap", &[Need::Function($f)],
+            no_wrap::<$f>),
+        case(concat!($name, "/quantity-before-address"), $section,
+            "a bad quantity at a bad address is exception 03, not 02", &[Need::Function($f)], quantity_first::<$f>),
+        case(concat!($name, "/length"), $section,
+            "a request a byte short or long under a good check is 03 or silence, never data",
+            &[Need::Function($f), Need::Readable($f)], length::<$f>).interpretation(),
+    ] };
 }
 
 pub(super) const FC01: &[Case] = &reading!(1, "fc01", "V1.1b3 6.1");
@@ -118,10 +82,8 @@ fn quantity_most<const F: u8>(bench: &mut Bench<'_>) -> Check {
     let request = pdu(F, span.map_or(0, |span| span.first), quantity);
     if span.is_some_and(|span| span.len() >= u32::from(quantity)) {
         let reply = bench.reply(&request)?;
-        return bench.ensure(
-            reply.len() == 252 && reply[1] == 250,
-            "250 data bytes and the byte count 250",
-        );
+        let wanted = "250 data bytes and the byte count 250";
+        return bench.ensure(reply.len() == 252 && reply[1] == 250, wanted);
     }
     bench.exception(&request, 2)
 }
@@ -186,10 +148,8 @@ fn alike<const A: u8, const B: u8>(bench: &mut Bench<'_>) -> Check {
         let quantity = span.len().min(u32::from(most(A))) as u16;
         let before = bench.reply(&pdu(A, span.first, quantity))?;
         let other = bench.reply(&pdu(B, span.first, quantity))?;
-        bench.ensure(
-            other.len() == before.len(),
-            format!("as long as by function {A:02X}"),
-        )?;
+        let wanted = format!("as long as by function {A:02X}");
+        bench.ensure(other.len() == before.len(), wanted)?;
         // Inputs and counters may change between the reads. Compare only the bytes that did not change.
         let after = bench.reply(&pdu(A, span.first, quantity))?;
         for at in (1..before.len()).filter(|at| before[*at] == after[*at]) {

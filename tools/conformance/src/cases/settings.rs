@@ -52,15 +52,10 @@ fn every_format(bench: &mut Bench<'_>) -> Check {
         Mode::Rtu => codes::Mode::Rtu,
         Mode::Ascii => codes::Mode::Ascii,
     };
-    let formats: Result<Vec<Format>, String> = codes::Format::ALL
-        .iter()
-        .zip(codes::Format::NAMES)
-        .filter(|(format, _)| format.suits(mode))
-        .map(|(_, (_, name))| name.parse())
-        .collect();
+    let formats = codes::Format::ALL.iter();
+    let formats = formats.filter(|format| format.suits(mode));
+    let formats: Result<Vec<Format>, _> = formats.map(|format| format.name().parse()).collect();
     let formats = formats.map_err(Stop::Skip)?.into_iter();
-    tour(
-        bench,
-        formats.map(|format| LineFormat::new(home.baud, format)),
-    )
+    let lines = formats.map(|format| LineFormat::new(home.baud, format));
+    tour(bench, lines)
 }

@@ -43,21 +43,13 @@ pub fn silence(bench: &mut Bench<'_>) -> Check<Duration> {
     Ok(line.t35_limits().least)
 }
 
-/// Returns the time from the end of the last request to the first start bit of the reply.
-fn turnaround(bench: &Bench<'_>) -> Duration {
-    let first = bench.received.first().map_or(Duration::ZERO, |h| h.start);
-    first.saturating_sub(bench.sent_end)
-}
-
 /// Allowance for times that were rounded to nanoseconds.
 const ROUNDING: Duration = Duration::from_nanos(10);
 
 fn not_before(bench: &Bench<'_>, least: Duration) -> Check {
-    let took = turnaround(bench);
-    bench.ensure(
-        took + ROUNDING >= least,
-        format!("a reply {least:?} after the request or later, not {took:?}"),
-    )
+    let took = bench.turnaround();
+    let wanted = format!("a reply {least:?} after the request or later, not {took:?}");
+    bench.ensure(took + ROUNDING >= least, wanted)
 }
 
 fn after_t35(bench: &mut Bench<'_>) -> Check {
@@ -87,11 +79,8 @@ fn exceptions_after_t35(bench: &mut Bench<'_>) -> Check {
 fn no_gap(bench: &mut Bench<'_>) -> Check {
     let t15 = bench.endpoint.line().t15_limits().least;
     for function in 1..=4 {
-        let Some(span) = bench
-            .target
-            .longest(function)
-            .filter(|_| bench.target.has(function))
-        else {
+        let span = bench.target.longest(function);
+        let Some(span) = span.filter(|_| bench.target.has(function)) else {
             continue;
         };
         let most = if function <= 2 { 2000 } else { 125 };
@@ -102,10 +91,8 @@ fn no_gap(bench: &mut Bench<'_>) -> Check {
             .windows(2)
             .map(|two| two[1].start.saturating_sub(two[0].end));
         let longest = gaps.max().unwrap_or_default();
-        bench.ensure(
-            longest < t15,
-            format!("gaps below t1.5, {t15:?}, in the reply, not {longest:?}"),
-        )?;
+        let wanted = format!("gaps below t1.5, {t15:?}, in the reply, not {longest:?}");
+        bench.ensure(longest < t15, wanted)?;
     }
     Ok(())
 }
@@ -125,10 +112,8 @@ fn driver(bench: &mut Bench<'_>) -> Check {
         let (Some(first), Some(last)) = (bench.received.first(), bench.received.last()) else {
             return bench.fail("a reply");
         };
-        bench.ensure(
-            on <= first.start + ROUNDING,
-            "the driver on before the first start bit",
-        )?;
+        let wanted = "the driver on before the first start bit";
+        bench.ensure(on <= first.start + ROUNDING, wanted)?;
         bench.ensure(
             off + ROUNDING >= last.end,
             format!(
@@ -137,14 +122,10 @@ fn driver(bench: &mut Bench<'_>) -> Check {
             ),
         )?;
         // The next request may follow t3.5 after the reply.
-        bench.ensure(
-            off <= last.end + line.t15_limits().most,
-            "the driver off well before the next request may come",
-        )?;
-        bench.ensure(
-            first.start <= on + line.t35_limits().most,
-            "the first start bit soon after the driver is on",
-        )?;
+        let wanted = "the driver off well before the next request may come";
+        bench.ensure(off <= last.end + line.t15_limits().most, wanted)?;
+        let wanted = "the first start bit soon after the driver is on";
+        bench.ensure(first.start <= on + line.t35_limits().most, wanted)?;
     }
     Ok(())
 }

@@ -23,10 +23,8 @@ pub(super) const CASES: &[Case] = &[
 fn for_others(bench: &mut Bench<'_>) -> Check {
     let unit = bench.unit();
     for worked in frames().filter(|w| w.crc_ok() && w.bytes[0] != unit) {
-        bench.silence_to(
-            &worked.bytes,
-            format!("the frame is for unit {}", worked.bytes[0]),
-        )?;
+        let why = format!("the frame is for unit {}", worked.bytes[0]);
+        bench.silence_to(&worked.bytes, why)?;
         bench.alive(format!("{} {}", worked.source, worked.place))?;
     }
     Ok(())
@@ -38,12 +36,8 @@ fn send(bench: &mut Bench<'_>, worked: &Worked, frame: &[u8]) -> Check {
     let function = frame[1];
     if let [_, 6 | 0x10, high, low, ..] = *frame {
         let address = u16::from_be_bytes([high, low]);
-        let there = bench
-            .target
-            .readable(3)
-            .iter()
-            .any(|span| span.has(address));
-        if worked.request && there {
+        let readable = bench.target.readable(3);
+        if worked.request && readable.iter().any(|span| span.has(address)) {
             return Ok(());
         }
     }
@@ -61,10 +55,8 @@ fn send(bench: &mut Bench<'_>, worked: &Worked, frame: &[u8]) -> Check {
             ordinary || (pdu.len() == 2 && pdu[0] == function | 0x80)
         }
     };
-    bench.ensure(
-        right,
-        format!("a reply or an exception in good form: {place}"),
-    )
+    let wanted = format!("a reply or an exception in good form: {place}");
+    bench.ensure(right, wanted)
 }
 
 fn for_this(bench: &mut Bench<'_>) -> Check {

@@ -43,16 +43,12 @@ fn on_and_off(bench: &mut Bench<'_>) -> Check {
     let span = bench.bits()?.up_to(16);
     for address in span.first..=span.last {
         for (value, state) in [(0xFF00, true), (0xFF00, true), (0, false)] {
-            let before = bench.read_bits(span)?;
+            let mut wanted = bench.read_bits(span)?;
             let request = pdu(5, address, value);
             bench.reply_is(&request, &request)?;
-            let mut wanted = before;
             wanted[usize::from(address - span.first)] = state;
-            let after = bench.read_bits(span)?;
-            bench.ensure(
-                after == wanted,
-                format!("coil {address:04X} is {state}, no other has changed"),
-            )?;
+            let text = format!("coil {address:04X} is {state}, no other has changed");
+            bench.bits_are(span, &wanted, text)?;
         }
     }
     Ok(())
@@ -65,8 +61,7 @@ fn value(bench: &mut Bench<'_>) -> Check {
         bench.set_bits(span.first, &[state])?;
         for value in [0x0001, 0x00FF, 0x0100, 0x1234, 0xFE00, 0xFF01, 0xFFFF] {
             bench.exception(&pdu(5, span.first, value), 3)?;
-            let now = bench.read_bits(at)?;
-            bench.ensure(now == [state], format!("the coil still is {state}"))?;
+            bench.bits_are(at, &[state], format!("the coil still is {state}"))?;
         }
     }
     Ok(())
@@ -102,8 +97,7 @@ fn every_quantity(bench: &mut Bench<'_>) -> Check {
             let values: Vec<bool> = (0..quantity).map(|n| (n % 2 == 1) == odd).collect();
             let request = write_bits(span.first, &values, false);
             bench.reply_is(&request, &request[..5])?;
-            let now = bench.read_bits(here)?;
-            bench.ensure(now == values, format!("the coils are {values:?}"))?;
+            bench.bits_are(here, &values, format!("the coils are {values:?}"))?;
         }
     }
     Ok(())
@@ -175,9 +169,8 @@ fn padding(bench: &mut Bench<'_>) -> Check {
         bench.set_bits(all.first, &vec![false; all.len() as usize])?;
         let request = write_bits(all.first, &vec![true; usize::from(quantity)], true);
         bench.reply_is(&request, &request[..5])?;
-        let now = bench.read_bits(all)?;
         let wanted: Vec<bool> = (0..all.len()).map(|n| n < u32::from(quantity)).collect();
-        bench.ensure(now == wanted, format!("the coils are {wanted:?}"))?;
+        bench.bits_are(all, &wanted, format!("the coils are {wanted:?}"))?;
     }
     Ok(())
 }
@@ -196,11 +189,8 @@ fn past_the_end(bench: &mut Bench<'_>) -> Check {
     let first = run.last - (whole - 1);
     let before = bench.read_bits(run.up_to(2000))?;
     bench.exception(&write_bits(run.last, &[true; 2], false), 2)?;
-    bench.exception(
-        &write_bits(first, &vec![true; usize::from(whole) + 1], false),
-        2,
-    )?;
+    let too_many = vec![true; usize::from(whole) + 1];
+    bench.exception(&write_bits(first, &too_many, false), 2)?;
     bench.exception(&write_bits(0xFFFF, &[true; 2], false), 2)?;
-    let now = bench.read_bits(run.up_to(2000))?;
-    bench.ensure(now == before, "no coil has been written")
+    bench.bits_are(run.up_to(2000), &before, "no coil has been written")
 }

@@ -51,11 +51,8 @@ fn echo(bench: &mut Bench<'_>) -> Check {
             let request = pdu(6, address, value);
             bench.reply_is(&request, &request)?;
             wanted[usize::from(address - span.first)] = value;
-            let now = bench.read_words(span)?;
-            bench.ensure(
-                now == wanted,
-                format!("register {address:04X} is {value:04X}, no other has changed"),
-            )?;
+            let text = format!("register {address:04X} is {value:04X}, no other has changed");
+            bench.words_are(span, &wanted, text)?;
         }
     }
     Ok(())
@@ -95,8 +92,7 @@ fn every_quantity(bench: &mut Bench<'_>) -> Check {
                 .collect();
             let request = write_words(here.first, &values);
             bench.reply_is(&request, &request[..5])?;
-            let now = bench.read_words(here)?;
-            bench.ensure(now == values, format!("the registers are {values:04X?}"))?;
+            bench.words_are(here, &values, format!("the registers are {values:04X?}"))?;
         }
     }
     Ok(())
@@ -123,13 +119,10 @@ fn quantity_out_of_range(bench: &mut Bench<'_>) -> Check {
 
 /// Returns the 123 registers that a case may write to, if the unit has that many. The case must restore their values.
 pub(super) fn wide(bench: &mut Bench<'_>) -> Check<Option<Span>> {
-    let config = bench.target.modio.is_some() && bench.allow_config && bench.target.has(3);
+    let config = bench.target.modio.is_some() && bench.target.allow_config && bench.target.has(3);
     if config {
         bench.unlock()?;
-        return Ok(Some(Span {
-            first: register_map::configuration::BETA,
-            last: register_map::configuration::BETA + 122,
-        }));
+        return Ok(Some(Span::of(register_map::configuration::BETA, 123)));
     }
     let known = bench.target.words.map(|words| words.span);
     Ok(known.filter(|span| span.len() >= 123))
@@ -172,11 +165,8 @@ fn quantity_most(bench: &mut Bench<'_>) -> Check {
         let values = bench.read_words(span)?;
         let request = write_words(span.first, &values);
         bench.reply_is(&request, &request[..5])?;
-        let now = bench.read_words(span)?;
-        return bench.ensure(
-            now == values,
-            "the registers have the values that were written",
-        );
+        let wanted = "the registers have the values that were written";
+        return bench.words_are(span, &values, wanted);
     }
     // A range that ends at an address that does not exist.
     let nowhere = bench.nowhere(3)?;
@@ -185,15 +175,8 @@ fn quantity_most(bench: &mut Bench<'_>) -> Check {
 }
 
 fn unchanged(bench: &mut Bench<'_>, at: u16, value: u16, count: usize) -> Check {
-    let span = Span {
-        first: at,
-        last: at + count as u16 - 1,
-    };
-    let now = bench.read_words(span)?;
-    bench.ensure(
-        now.iter().all(|word| *word == value),
-        format!("every register still is {value:04X}"),
-    )
+    let wanted = format!("every register still is {value:04X}");
+    bench.words_are(Span::of(at, count as u16), &vec![value; count], wanted)
 }
 
 fn byte_count(bench: &mut Bench<'_>) -> Check {
@@ -203,10 +186,7 @@ fn byte_count(bench: &mut Bench<'_>) -> Check {
     bench.set_words(at, &vec![words.low; usize::from(quantity)])?;
     let right = (quantity * 2) as u8;
     for count in [0, 1, right - 1, right + 1, right + 2, 246, 255] {
-        let high = words
-            .high
-            .to_be_bytes()
-            .repeat(usize::from(count).div_ceil(2));
+        let high = words.high.to_be_bytes().repeat(128);
         let head = [pdu(0x10, at, quantity), vec![count]].concat();
         bench.exception_03_with(&head, &high[..usize::from(count).min(246)])?;
     }
@@ -231,28 +211,13 @@ fn partly_out(bench: &mut Bench<'_>) -> Check {
     };
     // The last registers of the run, and the address after them, which does not exist.
     for count in 1..=run.len().min(8) as u16 {
-        let tail = Span {
-            first: run.last - (count - 1),
-            last: run.last,
-        };
+        let tail = Span::of(run.last - (count - 1), count);
         let before = bench.read_words(tail)?;
-        let mut values: Vec<u16> = before
-            .iter()
-            .map(|word| {
-                if *word == words.high {
-                    words.low
-                } else {
-                    words.high
-                }
-            })
-            .collect();
+        let mut values: Vec<u16> = before.iter().map(|word| words.other(*word)).collect();
         values.push(words.low);
         bench.exception(&write_words(tail.first, &values), 2)?;
-        let now = bench.read_words(tail)?;
-        let stands = bench.ensure(
-            now == before,
-            format!("the registers still are {before:04X?}"),
-        );
+        let wanted = format!("the registers still are {before:04X?}");
+        let stands = bench.words_are(tail, &before, wanted);
         if stands.is_err() {
             bench.set_words(tail.first, &before)?;
         }

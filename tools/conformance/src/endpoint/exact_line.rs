@@ -21,11 +21,7 @@ const HANDOVER: Duration = Duration::from_secs(5);
 
 /// A connection to a server.
 pub trait Transport {
-    /// Sends a request to the server and returns the reply.
-    ///
-    /// # Errors
-    ///
-    /// Why the server has refused the request, or why the server cannot be reached, in one line.
+    /// Sends a request to the server and returns the reply. The error is one line.
     fn ask(&mut self, request: &Request) -> Result<Reply, String>;
 }
 
@@ -42,10 +38,6 @@ pub struct ExactLine<T> {
 
 impl<T: Transport> ExactLine<T> {
     /// Sends `hello` to the server.
-    ///
-    /// # Errors
-    ///
-    /// When the server cannot be reached or does not support the protocol.
     pub fn new(mut server: T) -> Result<Self, Broken> {
         let reply = server.ask(&Request::Hello(VERSION)).map_err(Broken)?;
         let Reply::Hello(now, hello) = reply else {
@@ -206,9 +198,8 @@ impl<T: Transport> Endpoint for ExactLine<T> {
 
     fn take_driver_edges(&mut self) -> Result<Vec<(Duration, bool)>, Broken> {
         if !self.can(Ability::Driver) {
-            return Err(Broken(
-                "this endpoint does not record the driver".to_owned(),
-            ));
+            let why = "this endpoint does not record the driver";
+            return Err(Broken(why.to_owned()));
         }
         Ok(std::mem::take(&mut self.driver_edges))
     }
@@ -227,11 +218,7 @@ pub struct Tcp {
 }
 
 impl Tcp {
-    /// Connects to a server and sends `hello`.
-    ///
-    /// # Errors
-    ///
-    /// When no server answers at the address, or when another client uses the line.
+    /// Connects to a server and sends `hello`. Fails also when another client uses the line.
     pub fn connect(address: &str) -> Result<ExactLine<Self>, Broken> {
         let cannot = |why: String| Broken(format!("no exact line at {address}: {why}"));
         let begin = Instant::now();
@@ -259,10 +246,8 @@ impl Tcp {
 
 impl Transport for Tcp {
     fn ask(&mut self, request: &Request) -> Result<Reply, String> {
-        let written = self
-            .stream
-            .get_mut()
-            .write_all(format!("{request}\n").as_bytes());
+        let text = format!("{request}\n");
+        let written = self.stream.get_mut().write_all(text.as_bytes());
         let mut line = String::new();
         let read = self.stream.read_line(&mut line);
         match (written, read) {

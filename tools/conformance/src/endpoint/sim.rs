@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use modbus_line::LineFormat;
 use modbus_line::exact::{Reply, Request};
-use register_map::codes::{Baud, Format};
 use register_map::{Module, configuration};
 use sim::board::Layout;
 use sim::exact_line::Session;
@@ -13,6 +12,7 @@ use sim::{Board, Config, Image, Time};
 use super::Broken;
 use super::exact_line::{ExactLine, Transport};
 use crate::frame::Mode;
+use crate::rate::codes;
 
 /// Time that the unit has to start after power-on.
 const START: Time = Time::from_ms(150);
@@ -40,7 +40,6 @@ pub struct Fitting {
 
 impl Fitting {
     /// Returns a board with this image and empty slots, set as in the factory: address 1, 9600 8N2, RTU.
-    #[must_use]
     pub fn new(elf: PathBuf, board: &'static register_map::Board) -> Self {
         Self {
             elf,
@@ -62,10 +61,6 @@ pub struct InProcess {
 }
 
 /// Starts a board fitted like this. Returns the master's end of its line.
-///
-/// # Errors
-///
-/// When the image cannot be read, or the device has no such setting.
 pub fn start(fitting: &Fitting) -> Result<ExactLine<InProcess>, Broken> {
     let image = Image::read(&fitting.elf).map_err(|e| Broken(e.to_string()))?;
     let unknown = || Broken(format!("the simulator does not know the {}", fitting.board));
@@ -97,28 +92,16 @@ impl Transport for InProcess {
 /// Returns the contents of a flash in which these settings are stored.
 fn flash(fitting: &Fitting, config: &Config) -> Result<Vec<u8>, Broken> {
     let mut pairs: Vec<_> = configuration::modules(config.plugged()).collect();
-    pairs.extend(line_settings(fitting.line)?);
+    let codes = codes(fitting.line).map_err(Broken)?;
+    pairs.extend(
+        [configuration::BAUD, configuration::FORMAT]
+            .into_iter()
+            .zip(codes),
+    );
     if fitting.mode == Mode::Ascii {
         pairs.push((configuration::MODE, 1));
     }
     pairs.extend(&fitting.settings);
     let flash = config.layout.flash_with(&pairs);
     flash.ok_or_else(|| Broken("too many settings for a page of the store".to_owned()))
-}
-
-/// Returns the registers and values for this rate and format.
-fn line_settings(line: LineFormat) -> Result<[(u16, u16); 2], Broken> {
-    let baud = Baud::ALL
-        .iter()
-        .find(|baud| baud.bits_per_second() == line.baud)
-        .ok_or_else(|| Broken(format!("the device has no rate of {} bit/s", line.baud)))?;
-    let name = line.format.to_string();
-    let format = Format::NAMES
-        .iter()
-        .find(|(_, known)| *known == name)
-        .ok_or_else(|| Broken(format!("the device has no format {name}")))?;
-    Ok([
-        (configuration::BAUD, baud.code()),
-        (configuration::FORMAT, format.0),
-    ])
 }

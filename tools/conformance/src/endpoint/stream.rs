@@ -41,10 +41,6 @@ pub struct Stream {
 
 impl Stream {
     /// Opens a serial port or a pseudo-terminal.
-    ///
-    /// # Errors
-    ///
-    /// When the port cannot be opened, or does not support the format.
     pub fn serial(path: &Path, line: LineFormat) -> Result<Self, Broken> {
         let port = Port::open(path, line, SerialPort::open).map_err(Broken)?;
         let name = format!("{} at {line}", path.display());
@@ -52,10 +48,6 @@ impl Stream {
     }
 
     /// Connects to a socket; `line` is the rate and format of the line behind the socket.
-    ///
-    /// # Errors
-    ///
-    /// When no server answers at the address.
     pub fn tcp(address: &str, line: LineFormat) -> Result<Self, Broken> {
         let socket = connect(address)
             .map_err(|why| Broken(format!("cannot connect to {address}: {why}")))?;
@@ -106,10 +98,12 @@ impl Stream {
                 .and_then(|()| socket.read(&mut buffer)),
         };
         match read {
-            Ok(0) => Err(Broken(format!(
-                "{}: the other end has closed the connection",
-                self.name
-            ))),
+            Ok(0) => {
+                let name = &self.name;
+                Err(Broken(format!(
+                    "{name}: the other end has closed the connection"
+                )))
+            }
             Ok(length) => Ok(buffer[..length].to_vec()),
             Err(error) => match error.kind() {
                 ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted => {
@@ -192,9 +186,8 @@ impl Endpoint for Stream {
                     waiting.clear();
                 }
                 Piece::BadParity(_) | Piece::BadStop(_) | Piece::Break(_) | Piece::Glitch(_) => {
-                    return Err(Broken(
-                        "this endpoint cannot send damaged characters".to_owned(),
-                    ));
+                    let why = "this endpoint cannot send damaged characters";
+                    return Err(Broken(why.to_owned()));
                 }
             }
         }
@@ -251,15 +244,20 @@ impl Endpoint for Stream {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bench::apart;
     use std::net::TcpListener;
+
+    /// An endpoint, and the other end of its connection.
+    fn connected(line: LineFormat) -> (Stream, TcpStream) {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap().to_string();
+        let stream = Stream::tcp(&address, line).unwrap();
+        (stream, listener.accept().unwrap().0)
+    }
 
     #[test]
     fn line_that_is_never_silent_is_an_error() {
-        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-        let address = listener.local_addr().unwrap().to_string();
-        let line = LineFormat::new(115_200, "8N1".parse().unwrap());
-        let mut stream = Stream::tcp(&address, line).unwrap();
-        let (mut peer, _) = listener.accept().unwrap();
+        let (mut stream, mut peer) = connected(LineFormat::new(115_200, "8N1".parse().unwrap()));
         thread::spawn(move || while peer.write_all(&[0x55; 20]).is_ok() {});
         // A busy host may run the other thread only after a pause, which must not look like silence.
         let wait = Duration::from_secs(1);
@@ -269,17 +267,9 @@ mod tests {
 
     #[test]
     fn socket_sends_and_receives_bytes_and_detects_silence_and_the_end() {
-        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-        let address = listener.local_addr().unwrap().to_string();
-        let mut stream = Stream::tcp(&address, LineFormat::default()).unwrap();
-        let (mut peer, _) = listener.accept().unwrap();
-        stream
-            .send(&[
-                Piece::Bytes(vec![1, 2]),
-                Piece::Gap(Duration::from_millis(1)),
-                Piece::Bytes(vec![3]),
-            ])
-            .unwrap();
+        let (mut stream, mut peer) = connected(LineFormat::default());
+        let pieces = apart(&[1, 2], Duration::from_millis(1), &[3]);
+        stream.send(&pieces).unwrap();
         let mut got = [0; 3];
         peer.read_exact(&mut got).unwrap();
         assert_eq!(got, [1, 2, 3]);
@@ -287,22 +277,18 @@ mod tests {
         let short = Duration::from_millis(10);
         assert_eq!(stream.receive(short, short, usize::MAX).unwrap(), []);
         peer.write_all(&[9, 8]).unwrap();
-        let received = stream
-            .receive(Duration::from_secs(5), short, usize::MAX)
-            .unwrap();
+        let long = Duration::from_secs(5);
+        let received = stream.receive(long, short, usize::MAX).unwrap();
         let bytes: Vec<u8> = received.iter().map(|h| h.byte).collect();
         assert_eq!(bytes, [9, 8]);
         drop(peer);
-        let gone = stream.receive(Duration::from_secs(5), short, usize::MAX);
+        let gone = stream.receive(long, short, usize::MAX);
         assert!(gone.unwrap_err().0.contains("closed"));
     }
 
     #[test]
     fn bytes_of_a_late_reply_are_discarded_before_the_next_request() {
-        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-        let address = listener.local_addr().unwrap().to_string();
-        let mut stream = Stream::tcp(&address, LineFormat::default()).unwrap();
-        let (mut peer, _) = listener.accept().unwrap();
+        let (mut stream, mut peer) = connected(LineFormat::default());
         peer.write_all(&[1, 2, 3]).unwrap();
         thread::sleep(Duration::from_millis(50));
         let late: Vec<u8> = stream.flush().unwrap().iter().map(|h| h.byte).collect();
@@ -313,9 +299,7 @@ mod tests {
 
     #[test]
     fn damaged_characters_are_refused() {
-        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-        let address = listener.local_addr().unwrap().to_string();
-        let mut stream = Stream::tcp(&address, LineFormat::default()).unwrap();
+        let (mut stream, _) = connected(LineFormat::default());
         assert!(stream.send(&[Piece::BadStop(1)]).is_err());
         assert!(stream.set_line(LineFormat::default()).is_err());
     }

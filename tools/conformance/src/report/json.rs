@@ -6,7 +6,6 @@ use crate::report::Totals;
 use crate::run::{Outcome, Verdict};
 
 /// Returns the outcomes as a JSON value; `endpoint` is the name of the endpoint.
-#[must_use]
 pub fn value(endpoint: &str, outcomes: &[Outcome]) -> Value {
     let totals = Totals::of(outcomes);
     let cases: Vec<Value> = outcomes
@@ -34,7 +33,6 @@ pub fn value(endpoint: &str, outcomes: &[Outcome]) -> Value {
 }
 
 /// Returns a verdict and its reason as a JSON value.
-#[must_use]
 pub fn result(verdict: &Verdict) -> Value {
     match verdict {
         Verdict::Passed => json!({ "result": "passed" }),

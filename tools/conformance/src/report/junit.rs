@@ -28,13 +28,11 @@ pub struct Test<'a> {
 }
 
 /// Returns the outcomes as a JUnit document; `suite` is the name of the endpoint.
-#[must_use]
 pub fn document(suite: &str, outcomes: &[Outcome]) -> String {
     format!("{HEADER}{}", element(suite, &[], &tests(outcomes)))
 }
 
 /// Returns the outcomes as tests of a JUnit document.
-#[must_use]
 pub fn tests(outcomes: &[Outcome]) -> Vec<Test<'_>> {
     outcomes
         .iter()
@@ -50,7 +48,6 @@ pub fn tests(outcomes: &[Outcome]) -> Vec<Test<'_>> {
 }
 
 /// Returns one `testsuite` of a document, with properties: names and values.
-#[must_use]
 pub fn element(suite: &str, properties: &[(&str, String)], tests: &[Test<'_>]) -> String {
     let count = |is: fn(&Verdict) -> bool| tests.iter().filter(|test| is(test.verdict)).count();
     let time: Duration = tests.iter().map(|test| test.time).sum();

@@ -24,7 +24,6 @@ pub struct Totals {
 
 impl Totals {
     /// Counts outcomes.
-    #[must_use]
     pub fn of(outcomes: &[Outcome]) -> Self {
         let mut totals = Self::default();
         for outcome in outcomes {
@@ -48,7 +47,6 @@ impl Totals {
     }
 
     /// Returns the number of failed cases that make the run fail. Interpretations count only when `strict` is set.
-    #[must_use]
     pub const fn counted(&self, strict: bool) -> usize {
         if strict {
             self.failed
@@ -67,7 +65,6 @@ fn asked_again(times: u32) -> String {
     }
 }
 
-/// Outcomes for the tests of the reports.
 #[cfg(test)]
 fn some_outcomes() -> Vec<Outcome> {
     use crate::case::Failure;

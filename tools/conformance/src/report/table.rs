@@ -5,7 +5,6 @@ use crate::report::{Totals, asked_again};
 use crate::run::{Outcome, Verdict};
 
 /// Returns the row of a case, and for a failed case the failure below it.
-#[must_use]
 pub fn row(outcome: &Outcome) -> String {
     let (result, reason) = match &outcome.verdict {
         Verdict::Passed => ("ok", asked_again(outcome.asked_again)),
@@ -33,7 +32,6 @@ pub fn row(outcome: &Outcome) -> String {
 }
 
 /// Returns the line below the table.
-#[must_use]
 pub fn summary(outcomes: &[Outcome]) -> String {
     let totals = Totals::of(outcomes);
     let again = match asked_again(totals.asked_again) {
@@ -67,7 +65,6 @@ kinds and how to run the suite.
 ";
 
 /// Returns the cases as a page in Markdown, which is the output of `--list` and `docs/conformance-cases.md`.
-#[must_use]
 pub fn list(cases: &[Case]) -> String {
     let mut text = PAGE.to_owned();
     for case in cases {

@@ -1,6 +1,7 @@
 //! Runs the suite against a unit made of the reference server. Without a fault the unit passes every case. Each fault
 //! makes the cases fail that have to find it.
 
+mod command;
 mod endpoint;
 mod fault;
 mod modio;
@@ -10,13 +11,15 @@ mod unit;
 
 use std::collections::BTreeSet;
 
+use conformance::bench::Bench;
 use conformance::case::{Case, Kind, Need};
 use conformance::cases::all;
 use conformance::cli::waits;
 use conformance::frame::Mode;
 use conformance::probe::{Given, probe};
 use conformance::profile::Profile;
-use conformance::run::{Options, Outcome, Verdict, run};
+use conformance::run::{Outcome, Verdict, run};
+use conformance::target::Target;
 
 use endpoint::Reference;
 use fault::{FAULTS, Fault};
@@ -61,21 +64,24 @@ fn outcomes(
     if fault.is_some() {
         profile.functions = Some(conformance::probe::FUNCTIONS.to_vec());
     }
-    let given = Given {
-        unit: 9,
-        mode,
-        patience: waits(&endpoint, None),
-        profile: Some(&profile),
-        allow_config: false,
-    };
-    let (target, patience) = probe(&mut endpoint, &given).unwrap();
+    let target = probed(&mut endpoint, mode, Some(&profile));
     let mut cases = all();
     cases.retain(|case| only.is_none_or(|name| case.name == name));
-    let options = Options {
-        patience,
-        allow_config: false,
+    run(&mut endpoint, &target, &cases).unwrap()
+}
+
+/// Asks the unit of this profile, or the modio.
+fn probed(endpoint: &mut Reference, mode: Mode, profile: Option<&Profile>) -> Target {
+    let given = Given {
+        unit: profile
+            .map_or(Some(modio::UNIT), |profile| profile.unit)
+            .unwrap(),
+        mode,
+        patience: waits(endpoint, None),
+        profile,
+        allow_config: profile.is_none(),
     };
-    run(&mut endpoint, &target, options, &cases, |_| {}).unwrap()
+    probe(endpoint, &given).unwrap()
 }
 
 fn assert_passes(endpoint: Reference, mode: Mode) -> Vec<&'static str> {
@@ -145,22 +151,10 @@ fn every_fault_is_found_by_its_case() {
     assert!(missed.is_empty(), "not found: {missed:#?}");
 }
 
-/// Runs these cases on a modio with this fault.
 fn outcomes_of_modio(fault: Option<ModioFault>, cases: &[Case]) -> Vec<Outcome> {
     let mut endpoint = Reference::modio(fault, Mode::Rtu, LineFormat::default());
-    let given = Given {
-        unit: modio::UNIT,
-        mode: Mode::Rtu,
-        patience: waits(&endpoint, None),
-        profile: None,
-        allow_config: true,
-    };
-    let (target, patience) = probe(&mut endpoint, &given).unwrap();
-    let options = Options {
-        patience,
-        allow_config: true,
-    };
-    run(&mut endpoint, &target, options, cases, |_| {}).unwrap()
+    let target = probed(&mut endpoint, Mode::Rtu, None);
+    run(&mut endpoint, &target, cases).unwrap()
 }
 
 #[test]
@@ -208,30 +202,14 @@ fn points_that_cases_write_to_are_restored() {
     let line = LineFormat::default();
     let mut endpoint = Reference::new(None, Mode::Rtu, line);
     let profile = Profile::parse(PROFILE).unwrap();
-    let given = Given {
-        unit: 9,
-        mode: Mode::Rtu,
-        patience: waits(&endpoint, None),
-        profile: Some(&profile),
-        allow_config: false,
-    };
-    let (target, patience) = probe(&mut endpoint, &given).unwrap();
-    let snapshot = |endpoint: &mut Reference| {
-        let mut bench = conformance::bench::Bench::new(endpoint, &target, patience, false);
-        bench.snapshot().unwrap()
-    };
-    {
-        let mut bench = conformance::bench::Bench::new(&mut endpoint, &target, patience, false);
-        bench.set_bits(100, &[true, false, true]).unwrap();
-        bench.set_words(1000, &[17, 18, 19]).unwrap();
-    }
-    let before = snapshot(&mut endpoint);
+    let target = probed(&mut endpoint, Mode::Rtu, Some(&profile));
+    let mut bench = Bench::new(&mut endpoint, &target);
+    bench.set_bits(100, &[true, false, true]).unwrap();
+    bench.set_words(1000, &[17, 18, 19]).unwrap();
+    let before = bench.snapshot().unwrap();
     let mut cases = all();
     cases.retain(|case| !case.name.starts_with("power/"));
-    let options = Options {
-        patience,
-        allow_config: false,
-    };
-    run(&mut endpoint, &target, options, &cases, |_| {}).unwrap();
-    assert_eq!(snapshot(&mut endpoint), before);
+    run(&mut endpoint, &target, &cases).unwrap();
+    let mut bench = Bench::new(&mut endpoint, &target);
+    assert_eq!(bench.snapshot().unwrap(), before);
 }

@@ -26,6 +26,8 @@ const OUTPUT: u16 = FIRST + 2;
 /// The first point of the slot, port 5.
 const FIRST: u16 = points::first(5);
 const OUTPUTS: usize = 2;
+/// The first address after all registers.
+const END: u16 = 0x0600;
 
 /// Reset causes: power-on or the software, and the pin.
 const POWER_ON: u16 = 0x30;
@@ -207,95 +209,44 @@ impl Modio {
     }
 
     fn points(&mut self, pdu: &[u8], counters: &[u16; 9]) -> Answer {
-        let word = |at: usize| u16::from_be_bytes([pdu[at], pdu[at + 1]]);
-        let fixed = match pdu[0] {
-            1..=6 => Some(5),
-            0x16 => Some(7),
-            _ => None,
+        let points = [&[false; FIRST as usize][..], &INPUTS, &self.outputs].concat();
+        let words = (0..END).map(|address| self.value(address, counters));
+        let words: Vec<u16> = words.collect();
+        let mut device = Device {
+            bits: points.clone(),
+            input_bits: points,
+            words: words.clone(),
+            input_words: words,
+            max_word: u16::MAX,
+            ..Device::new(0, 0)
         };
-        let least = if pdu[0] == 0x17 { 10 } else { 6 };
-        if fixed.map_or(pdu.len() < least, |length| pdu.len() != length) {
-            return Err(3);
+        if self.has(ModioFault::InputsBy02Only) {
+            device.bits[usize::from(FIRST)..usize::from(OUTPUT)].fill(false);
         }
-        let (start, second) = (word(1), word(3));
-        let echo = || Ok(pdu[1..5].to_vec());
+        if self.has(ModioFault::HidesFrom04) {
+            device.input_words[usize::from(at::BAUD)] = 0;
+        }
+        let reply = modbus_reference::answer(&mut device, pdu)?;
+        let word = |at: usize| u16::from_be_bytes([pdu[at], pdu[at + 1]]);
+        let (start, count) = match pdu[0] {
+            5 | 6 | 0x16 => (word(1), 1),
+            0x17 => (word(5), word(7)),
+            _ => (word(1), word(3)),
+        };
+        let written = usize::from(start)..usize::from(start) + usize::from(count);
         match pdu[0] {
-            function @ 1..=2 => self.read_bits(function, start, second),
-            function @ 3..=4 => self.read(function, start, second, counters),
-            5 => {
-                let value = match second {
-                    0xFF00 => true,
-                    0 => false,
-                    _ => return Err(3),
-                };
-                self.write_bits(start, &[value]).and_then(|()| echo())
+            1 | 2 if start < FIRST => return Err(2),
+            1 | 2 => {}
+            3 | 4 => can_read(start, count)?,
+            5 | 0x0F => self.write_bits(start, &device.bits[written])?,
+            0x17 => {
+                can_read(word(1), word(3))?;
+                self.write(start, &device.words[written])?;
+                return self.points(&[&[3], &pdu[1..5]].concat(), counters);
             }
-            6 => self.write(start, &[second]).and_then(|()| echo()),
-            0x0F => {
-                let data = &pdu[6..];
-                let whole = usize::from(second).div_ceil(8);
-                let right = usize::from(pdu[5]) == whole && data.len() == whole;
-                if !(1..=1968).contains(&second) || !right {
-                    return Err(3);
-                }
-                let bit = |n: usize| data[n / 8] >> (n % 8) & 1 == 1;
-                let bits: Vec<bool> = (0..usize::from(second)).map(bit).collect();
-                self.write_bits(start, &bits).and_then(|()| echo())
-            }
-            0x10 => {
-                let words = words(second, 123, &pdu[5..])?;
-                self.write(start, &words).and_then(|()| echo())
-            }
-            0x16 => {
-                let before = self.read(3, start, 1, counters)?;
-                let before = u16::from_be_bytes([before[1], before[2]]);
-                let (and, or) = (second, word(5));
-                self.write(start, &[before & and | or & !and])?;
-                Ok(pdu[1..].to_vec())
-            }
-            _ => {
-                let words = words(word(7), 121, &pdu[9..])?;
-                self.read(3, start, second, counters)?;
-                self.write(word(5), &words)?;
-                self.read(3, start, second, counters)
-            }
+            _ => self.write(start, &device.words[written])?,
         }
-    }
-
-    fn read_bits(&self, function: u8, start: u16, quantity: u16) -> Answer {
-        if !(1..=2000).contains(&quantity) {
-            return Err(3);
-        }
-        let points = [INPUTS, self.outputs].concat();
-        let from = usize::from(start.checked_sub(FIRST).ok_or(2)?);
-        let bits = points.get(from..from + usize::from(quantity)).ok_or(2)?;
-        let mut data = 0;
-        for (n, bit) in bits.iter().enumerate() {
-            let hidden = function == 1 && from + n < INPUTS.len();
-            let hidden = hidden && self.has(ModioFault::InputsBy02Only);
-            data |= u8::from(*bit && !hidden) << n;
-        }
-        Ok(vec![1, data])
-    }
-
-    fn read(&self, function: u8, start: u16, quantity: u16, counters: &[u16; 9]) -> Answer {
-        if !(1..=125).contains(&quantity) {
-            return Err(3);
-        }
-        let registers = BLOCKS.iter().skip(1);
-        let there = |block: &&&register_map::Block| runs(block.rules, start, quantity).is_some();
-        registers.into_iter().find(there).ok_or(2)?;
-        let mut data = vec![(quantity * 2) as u8];
-        for address in start..=start + (quantity - 1) {
-            let hidden = function == 4 && address == at::BAUD && self.has(ModioFault::HidesFrom04);
-            let value = if hidden {
-                0
-            } else {
-                self.value(address, counters)
-            };
-            data.extend(value.to_be_bytes());
-        }
-        Ok(data)
+        Ok(reply[1..].to_vec())
     }
 
     fn value(&self, address: u16, counters: &[u16; 9]) -> u16 {
@@ -436,13 +387,9 @@ fn description() -> Description {
     describe(&MODIO_02, "0.1.0", |_| MODULE)
 }
 
-/// The words of a write of `quantity`, at most `most`, after their byte count.
-fn words(quantity: u16, most: u16, data: &[u8]) -> Result<Vec<u16>, u8> {
-    let (count, data) = data.split_first().ok_or(3)?;
-    let whole = usize::from(quantity) * 2;
-    if !(1..=most).contains(&quantity) || usize::from(*count) != whole || data.len() != whole {
-        return Err(3);
-    }
-    let (pairs, _) = data.as_chunks::<2>();
-    Ok(pairs.iter().map(|pair| u16::from_be_bytes(*pair)).collect())
+/// Checks that these registers are in one block.
+fn can_read(start: u16, count: u16) -> Result<(), u8> {
+    let blocks = BLOCKS.iter().skip(1);
+    let mut found = blocks.filter_map(|block| runs(block.rules, start, count));
+    found.next().map(|_| ()).ok_or(2)
 }

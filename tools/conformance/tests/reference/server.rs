@@ -391,7 +391,6 @@ fn place((first, count): (u16, usize), at: u16, quantity: u16) -> Result<usize, 
     }
 }
 
-/// The table that a function uses.
 fn table(function: u8) -> (u16, usize) {
     match function {
         1 | 5 | 0x0F => COILS,

@@ -19,13 +19,12 @@ use conformance::endpoint::sim::{Fitting, start};
 use conformance::frame::Mode;
 use conformance::probe::{Given, probe};
 use conformance::report::table;
-use conformance::run::{Options, Outcome, Verdict, run};
+use conformance::run::{Outcome, Verdict, run};
 use modbus_line::LineFormat;
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 use register_map::board::{MODIO_02, MODIO_08};
 use register_map::{Board, Module, configuration};
 
-/// The image of a board.
 fn elf(board: &Board) -> PathBuf {
     let name = if *board == MODIO_02 {
         "MODIO_ELF"
@@ -36,7 +35,6 @@ fn elf(board: &Board) -> PathBuf {
     PathBuf::from(elf.unwrap_or_else(|| panic!("{name}: cargo xtask test sets it")))
 }
 
-/// A modio-02 with this module and the factory settings.
 fn modio_02(module: Module) -> Fitting {
     Fitting {
         module,
@@ -52,7 +50,6 @@ fn modio_08(modules: [Module; 4]) -> Fitting {
     }
 }
 
-/// The rate and format of a line.
 fn line(baud: u32, format: &str) -> LineFormat {
     LineFormat::new(baud, format.parse().expect("a format"))
 }
@@ -66,15 +63,10 @@ fn outcomes(endpoint: &mut dyn Endpoint, dip: u8, mode: Mode, cases: &[Case]) ->
         profile: None,
         allow_config: true,
     };
-    let (target, patience) = probe(endpoint, &given).expect("the unit answers");
-    let options = Options {
-        patience,
-        allow_config: true,
-    };
-    run(endpoint, &target, options, cases, |_| {}).expect("the endpoint works")
+    let target = probe(endpoint, &given).expect("the unit answers");
+    run(endpoint, &target, cases).expect("the endpoint works")
 }
 
-/// Runs these cases in process.
 fn in_process(fitting: &Fitting, cases: &[Case]) -> Vec<Outcome> {
     let mut endpoint = start(fitting).expect("the image can be read");
     outcomes(&mut endpoint, fitting.dip, fitting.mode, cases)
@@ -88,7 +80,6 @@ fn failed(outcomes: &[Outcome]) -> Vec<String> {
     failed.map(table::row).collect()
 }
 
-/// Number of cases that passed.
 fn passed(outcomes: &[Outcome]) -> usize {
     let passed = outcomes.iter().filter(|o| o.verdict == Verdict::Passed);
     passed.count()

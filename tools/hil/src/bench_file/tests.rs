@@ -15,17 +15,15 @@ fn example_in_the_documentation_is_read() {
     assert_eq!((file.unit, file.baud), (Some(1), Some(9600)));
     assert_eq!(file.module, Some(Module::Do4));
     assert_eq!(file.probe.as_deref(), Some("0483:3748"));
-    let [wire] = file.wires[..] else {
+    let [wire] = file.wires()[..] else {
         panic!("{file:?}");
     };
     let shown = "unit 1 point 0x0010 to unit 2 point 0x0010";
     assert_eq!(wire.to_string(), shown);
     assert_eq!((wire.within.as_millis(), wire.pulses), (50, 100));
     assert!(wire.inverted);
-    assert_eq!(
-        (file.analog[0].tolerance, file.analog[0].from.unit),
-        (40, 3)
-    );
+    let analog = file.analog()[0];
+    assert_eq!((analog.tolerance, analog.from.unit), (40, 3));
 }
 
 #[test]
@@ -39,8 +37,8 @@ fn examples_in_the_manual_are_read() {
     let [bench, wires] = &examples[..] else {
         panic!("{} examples", examples.len());
     };
-    assert_eq!((bench.module, wires.wires.len()), (Some(Module::Do4), 1));
-    assert_eq!(wires.analog.len(), 1);
+    assert_eq!((bench.module, wires.wires().len()), (Some(Module::Do4), 1));
+    assert_eq!(wires.analog().len(), 1);
 }
 
 #[test]
@@ -48,15 +46,13 @@ fn keys_that_are_left_out_have_their_defaults_and_the_unit_is_that_of_the_comman
     let text = "unit = 8\n[[wire]]\nfrom = { point = 0x10 }\nto = { unit = 2, point = 17 }\n\
                 [[analog]]\nfrom = { point = 18 }\nto = { point = 17 }\ntolerance = 1\n";
     let file = BenchFile::parse(text, None).unwrap();
-    assert_eq!(file.wires[0].from.unit, 8);
+    assert_eq!(file.wires()[0].from.unit, 8);
     let file = BenchFile::parse(text, Some(9)).unwrap();
-    assert_eq!((file.wires[0].from.unit, file.analog[0].to.unit), (9, 9));
-    let wire = file.wires[0];
-    assert_eq!(
-        (wire.within, wire.inverted, wire.pulses),
-        (usual(), false, 0)
-    );
-    assert_eq!(file.analog[0].within, filtered());
+    let (wire, analog) = (file.wires()[0], file.analog()[0]);
+    assert_eq!((wire.from.unit, analog.to.unit), (9, 9));
+    let others = (wire.within, wire.inverted, wire.pulses);
+    assert_eq!(others, (usual(), false, 0));
+    assert_eq!(analog.within, filtered());
     assert_eq!(BenchFile::parse("", None), Ok(BenchFile::default()));
 }
 
@@ -65,11 +61,10 @@ fn error_is_one_line_that_begins_with_the_number_of_the_line() {
     let wire =
         |from: &str, to: &str, more: &str| format!("[[wire]]\nfrom = {from}\nto = {to}\n{more}\n");
     let good = wire("{ point = 16 }", "{ unit = 2, point = 16 }", "");
+    let (one, two) = ("{ point = 1 }", "{ point = 2 }");
+    let back = wire("{ unit = 2, point = 16 }", one, "");
     for (text, wrong) in [
-        (
-            "unit = 1\ncolour = 3".to_owned(),
-            "2: unknown field `colour`",
-        ),
+        ("\ncolour = 3".to_owned(), "2: unknown field `colour`"),
         ("\n[[wires]]".to_owned(), "2: unknown field `wires`"),
         ("[[wire".to_owned(), "1: "),
         ("unit = 248".to_owned(), "1: unit = 248 is not"),
@@ -77,47 +72,17 @@ fn error_is_one_line_that_begins_with_the_number_of_the_line() {
         ("baud = 100".to_owned(), "1: baud = 100 is not"),
         ("format = \"8X2\"".to_owned(), "1: "),
         ("\nmodule = \"5do\"".to_owned(), "2: "),
-        (
-            wire("{ point = 16 }", "{ unit = 2 }", ""),
-            "3: missing field `point`",
-        ),
-        (wire("{ point = 16 }", "{ point = -1 }", ""), "3: point = "),
-        (
-            wire("{ point = 32 }", "{ point = 1 }", ""),
-            "2: point = 0x0020 is not",
-        ),
-        (
-            wire("{ unit = 0, point = 1 }", "{ point = 2 }", ""),
-            "2: unit = 0",
-        ),
-        (
-            wire("{ point = 1 }", "{ point = 2 }", "within_ms = 0"),
-            "4: within_ms = 0",
-        ),
-        (
-            wire("{ point = 1 }", "{ point = 2 }", "within = 5"),
-            "4: unknown field",
-        ),
-        (wire("{ point = 1 }", "{ point = 2 }", "pulses = -1"), "4: "),
-        (
-            wire("{ point = 1 }", "{ point = 1 }", ""),
-            "1: a point is an output",
-        ),
-        (
-            format!("{good}{good}"),
-            "5: unit 2 point 0x0010 has a wire already",
-        ),
-        (
-            format!(
-                "{good}{}",
-                wire("{ unit = 2, point = 16 }", "{ point = 3 }", "")
-            ),
-            "5: a point is an output",
-        ),
-        (
-            good.replace("wire", "analog"),
-            "1: missing field `tolerance`",
-        ),
+        (wire(one, "{ unit = 2 }", ""), "3: missing field `point`"),
+        (wire(one, "{ point = -1 }", ""), "3: point = "),
+        (wire("{ point = 32 }", one, ""), "2: point = 0x0020 is not"),
+        (wire("{ unit = 0, point = 1 }", two, ""), "2: unit = 0"),
+        (wire(one, two, "within_ms = 0"), "4: within_ms = 0"),
+        (wire(one, two, "within = 5"), "4: unknown field"),
+        (wire(one, two, "pulses = -1"), "4: "),
+        (wire(one, one, ""), "1: a point is an output"),
+        (format!("{good}{good}"), "5: unit 2 point 0x0010 has a wire"),
+        (format!("{good}{back}"), "5: a point is an output"),
+        (good.replace("wire", "analog"), "1: missing field `tol"),
     ] {
         let error = BenchFile::parse(&text, None).unwrap_err();
         assert!(

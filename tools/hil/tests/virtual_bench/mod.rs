@@ -55,7 +55,6 @@ impl Loop {
     }
 }
 
-/// The simulator with the boards.
 struct Simulator {
     child: Child,
     /// Where its HTTP interface listens, HOST:PORT.

@@ -49,18 +49,8 @@ mod tests {
 
     #[test]
     fn texts_that_are_not_times_are_rejected() {
-        for text in [
-            "",
-            ".",
-            "1.",
-            ".5",
-            "-1",
-            "+1",
-            "1e3",
-            "1.2345",
-            "1,5",
-            "99999999999999999999",
-        ] {
+        let wrong = "|.|1.|.5|-1|+1|1e3|1.2345|1,5|99999999999999999999";
+        for text in wrong.split('|') {
             assert!(parse(text).unwrap_err().contains(text), "{text}");
         }
     }

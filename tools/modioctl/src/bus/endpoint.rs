@@ -29,7 +29,6 @@ pub enum Place {
 
 impl Place {
     /// Returns whether a change of the unit's line settings also concerns this computer's port.
-    #[must_use]
     pub const fn is_serial(&self) -> bool {
         matches!(self, Self::Serial(_))
     }
@@ -57,15 +56,27 @@ pub struct Endpoint {
 }
 
 impl Endpoint {
+    /// Returns the endpoint at this place with the usual settings.
+    pub fn new(place: Place, framing: Framing) -> Self {
+        Self {
+            place,
+            baud: 9600,
+            format: Format::default(),
+            framing,
+            unit: 1,
+            timeout: Duration::from_secs(1),
+            retries: 2,
+            timeout_given: false,
+        }
+    }
+
     /// Returns rate and format of the line.
-    #[must_use]
     pub const fn line(&self) -> LineFormat {
         LineFormat::new(self.baud, self.format)
     }
 
     /// Returns the duration of `bytes` bytes on the line, also for a gateway in transparent mode. Returns zero for
     /// Modbus TCP, whose server handles the timing of its line itself.
-    #[must_use]
     pub fn time_of(&self, bytes: usize) -> Duration {
         if self.framing == Framing::Mbap {
             return Duration::ZERO;
@@ -74,7 +85,6 @@ impl Endpoint {
     }
 
     /// Returns the silence between frames on a serial line: t3.5, in characters of the line's format.
-    #[must_use]
     pub fn frame_gap(&self) -> Duration {
         match self.framing {
             Framing::Mbap => Duration::ZERO,
@@ -138,10 +148,6 @@ fn address(text: &str) -> Result<String, String> {
 }
 
 /// Returns host and port of a network address.
-///
-/// # Errors
-///
-/// When the address has no port.
 pub fn host_and_port(address: &str) -> Result<(String, u16), String> {
     let (host, port) = address.rsplit_once(':').unwrap_or((address, ""));
     match port.parse() {
@@ -185,10 +191,6 @@ fn unit(text: &str) -> Result<u8, String> {
 }
 
 /// Parses a duration with its unit, or a number of seconds.
-///
-/// # Errors
-///
-/// A description of what is wrong with the text.
 pub fn duration(text: &str) -> Result<Duration, String> {
     let seconds = text.parse::<f64>().ok();
     let duration = match seconds.map(Duration::try_from_secs_f64) {
@@ -201,19 +203,6 @@ pub fn duration(text: &str) -> Result<Duration, String> {
     }
 }
 
-/// Names of the options in files. In the environment they are in capitals after `MODIO_`.
-const NAMES: [&str; 9] = [
-    "port",
-    "tcp",
-    "modbus-tcp",
-    "baud",
-    "format",
-    "mode",
-    "unit",
-    "timeout",
-    "retries",
-];
-
 /// Parses options from a file or the environment in the same way as those of the command line.
 #[derive(Parser)]
 #[command(no_binary_name = true, disable_help_flag = true)]
@@ -222,17 +211,19 @@ struct Elsewhere {
     options: Options,
 }
 
+/// Returns the names of the options in files. In the environment they are in capitals after `MODIO_`.
+fn names() -> Vec<String> {
+    let command = Elsewhere::command();
+    let names = command.get_arguments().filter_map(clap::Arg::get_long);
+    names.map(str::to_owned).collect()
+}
+
 impl Options {
     /// Returns the endpoint. Each option is from the command line, or else from the named endpoint, or else from
     /// the environment.
-    ///
-    /// # Errors
-    ///
-    /// When a value, a name or the file is wrong, or when no source gives the address of the unit.
     pub fn endpoint(self, at: Option<&str>, file: Option<&Path>) -> Result<Endpoint, Failure> {
         let environment = Self::from_environment()?;
-        let variable = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
-        let at = at.map(str::to_owned).or_else(|| variable("MODIO_AT"));
+        let at = at.map(str::to_owned).or_else(|| variable("AT"));
         let named = match at {
             Some(name) => Self::named(&name, file)?,
             None => Self::default(),
@@ -246,21 +237,21 @@ impl Options {
             (_, Some(Mode::Ascii)) => Framing::Ascii,
             _ => Framing::Rtu,
         };
-        let format = merged.format.unwrap_or_default();
-        if framing == Framing::Rtu && format.data_bits == 7 && place.is_serial() {
+        let usual = Endpoint::new(place, framing);
+        let format = merged.format.unwrap_or(usual.format);
+        if framing == Framing::Rtu && format.data_bits == 7 && usual.place.is_serial() {
             return Err(Failure::usage(format!(
                 "--format {format}: RTU needs 8 data bits; 7 are for --mode ascii"
             )));
         }
         Ok(Endpoint {
-            place,
-            baud: merged.baud.unwrap_or(9600),
+            baud: merged.baud.unwrap_or(usual.baud),
             format,
-            framing,
-            unit: merged.unit.unwrap_or(1),
-            timeout: merged.timeout.unwrap_or(Duration::from_secs(1)),
-            retries: merged.retries.unwrap_or(2),
+            unit: merged.unit.unwrap_or(usual.unit),
+            timeout: merged.timeout.unwrap_or(usual.timeout),
+            retries: merged.retries.unwrap_or(usual.retries),
             timeout_given: merged.timeout.is_some(),
+            ..usual
         })
     }
 
@@ -292,10 +283,9 @@ impl Options {
     }
 
     fn from_environment() -> Result<Self, Failure> {
-        let variables = NAMES.iter().filter_map(|name| {
-            let variable = format!("MODIO_{}", name.to_uppercase().replace('-', "_"));
-            let value = std::env::var(variable).ok()?;
-            (!value.is_empty()).then(|| ((*name).to_owned(), value))
+        let variables = names().into_iter().filter_map(|name| {
+            let value = variable(&name.to_uppercase().replace('-', "_"))?;
+            Some((name, value))
         });
         Self::parse(variables).map_err(|what| {
             Failure::usage(format!("in the environment (MODIO_PORT and so on): {what}"))
@@ -314,22 +304,20 @@ impl Options {
         let mut tables: toml::Table = text.parse().map_err(|error: toml::de::Error| {
             Failure::usage(format!("{shown}: {}", error.message()))
         })?;
-        let known = || tables.keys().cloned().collect::<Vec<_>>().join(", ");
-        let Some(toml::Value::Table(table)) = tables.get(name) else {
+        let known: Vec<_> = tables.keys().cloned().collect();
+        let Some(toml::Value::Table(table)) = tables.remove(name) else {
             return Err(Failure::usage(format!(
                 "{shown} has no endpoint {name}; it has: {}",
-                known()
+                known.join(", ")
             )));
         };
-        if let Some(unknown) = table.keys().find(|key| !NAMES.contains(&key.as_str())) {
+        let names = names();
+        if let Some(unknown) = table.keys().find(|key| !names.contains(key)) {
             return Err(Failure::usage(format!(
                 "{shown}, endpoint {name}: unknown option {unknown}; there are {}",
-                NAMES.join(", ")
+                names.join(", ")
             )));
         }
-        let Some(toml::Value::Table(table)) = tables.remove(name) else {
-            return Ok(Self::default());
-        };
         let values = table.into_iter().map(|(key, value)| {
             let text = match value {
                 toml::Value::String(text) => text,
@@ -352,8 +340,13 @@ impl Options {
     }
 }
 
+/// Returns an option in the environment.
+fn variable(name: &str) -> Option<String> {
+    let value = std::env::var(format!("MODIO_{name}")).ok();
+    value.filter(|value| !value.is_empty())
+}
+
 /// Returns clap's message as one line, without its heading and the usage.
-#[must_use]
 pub fn one_line(error: &clap::Error) -> String {
     let text = error.to_string();
     let is_about_error = |line: &&str| {
@@ -367,10 +360,6 @@ pub fn one_line(error: &clap::Error) -> String {
 }
 
 /// Returns the default file of named endpoints: `modio/endpoints.toml` in the system's directory for settings.
-///
-/// # Errors
-///
-/// When there is no home directory.
 pub fn usual_file() -> Result<PathBuf, Failure> {
     let strategy = etcetera::choose_base_strategy()
         .map_err(|_| Failure::usage("there is no home directory: give --endpoints FILE"))?;
@@ -381,15 +370,17 @@ pub fn usual_file() -> Result<PathBuf, Failure> {
 mod tests {
     use super::*;
 
-    fn parse(values: &[(&str, &str)]) -> Result<Options, String> {
-        let owned = |(name, value): &(&str, &str)| ((*name).to_owned(), (*value).to_owned());
-        Options::parse(values.iter().map(owned))
+    fn parse(values: &str) -> Result<Options, String> {
+        let values = values
+            .split(' ')
+            .map(|value| value.split_once('=').unwrap());
+        Options::parse(values.map(|(name, value)| (name.to_owned(), value.to_owned())))
     }
 
     #[test]
     fn an_option_has_priority_over_that_of_a_file() {
-        let given = parse(&[("tcp", "a:1"), ("baud", "19200")]).unwrap();
-        let file = parse(&[("port", "COM3"), ("baud", "1200"), ("unit", "9")]).unwrap();
+        let given = parse("tcp=a:1 baud=19200").unwrap();
+        let file = parse("port=COM3 baud=1200 unit=9").unwrap();
         let endpoint = given.or(file).endpoint(None, None).unwrap();
         assert_eq!(endpoint.place, Place::Tcp("a:1".to_owned()));
         assert_eq!((endpoint.baud, endpoint.unit), (19_200, 9));
@@ -398,58 +389,36 @@ mod tests {
 
     #[test]
     fn a_wrong_value_is_reported_with_its_option() {
-        let wrong = parse(&[("unit", "300")]).unwrap_err();
-        assert!(
-            wrong.contains("--unit") && wrong.contains("1 to 247"),
-            "{wrong}"
-        );
-        assert!(parse(&[("port", "a"), ("tcp", "b:1")]).is_err());
-        let seven = parse(&[("port", "a"), ("format", "7E1")]).unwrap();
+        let wrong = parse("unit=300").unwrap_err();
+        let right = wrong.contains("--unit") && wrong.contains("1 to 247");
+        assert!(right, "{wrong}");
+        assert!(parse("port=a tcp=b:1").is_err());
+        let seven = parse("port=a format=7E1").unwrap();
         assert!(seven.endpoint(None, None).is_err(), "RTU with 7 data bits");
     }
 
     #[test]
     fn a_wrong_value_is_reported_in_one_line_with_an_example() {
-        for (option, value, example) in [
+        for (given, example) in [
+            ("baud=abc", "from 50 to 4000000 is needed, such as 9600"),
+            ("baud=1", "from 50 to 4000000 is needed, such as 9600"),
+            ("retries=x", "from 0 to 20 is needed, such as 2"),
+            ("tcp=localhost", "is needed, such as localhost:502"),
             (
-                "baud",
-                "abc",
-                "a number from 50 to 4000000 is needed, such as 9600",
-            ),
-            (
-                "baud",
-                "1",
-                "a number from 50 to 4000000 is needed, such as 9600",
-            ),
-            ("retries", "x", "a number from 0 to 20 is needed, such as 2"),
-            (
-                "tcp",
-                "localhost",
-                "a host with a port is needed, such as localhost:502",
-            ),
-            (
-                "modbus-tcp",
-                "a:b",
+                "modbus-tcp=a:b",
                 "a host with a port is needed, such as a:502",
             ),
-            (
-                "tcp",
-                ":502",
-                "a host with a port is needed, such as 192.168.1.5:502",
-            ),
-            (
-                "timeout",
-                "abc",
-                "a time from 1ms to 1h is needed, such as 200ms",
-            ),
-            ("mode", "x", "[possible values: rtu, ascii]"),
+            ("tcp=:502", "is needed, such as 192.168.1.5:502"),
+            ("timeout=abc", "from 1ms to 1h is needed, such as 200ms"),
+            ("mode=x", "[possible values: rtu, ascii]"),
         ] {
-            let wrong = parse(&[(option, value)]).unwrap_err();
+            let wrong = parse(given).unwrap_err();
+            let (option, value) = given.split_once('=').unwrap();
             assert!(wrong.starts_with(&format!("invalid value '{value}' for '--{option}")));
             assert!(wrong.ends_with(example), "{wrong}");
             assert_eq!(wrong.lines().count(), 1, "{wrong}");
         }
-        assert!(parse(&[("modbus-tcp", "[::1]:502")]).is_ok());
+        assert!(parse("modbus-tcp=[::1]:502").is_ok());
     }
 
     #[test]

@@ -12,9 +12,6 @@ use super::{Direction, Waiting};
 use crate::failure::Failure;
 use register_map::state::PRODUCT_CODE;
 
-/// Pause after a broadcast, in which every unit executes it (V1.02, 2.4.1: 100 to 200 ms).
-const TURNAROUND: Duration = Duration::from_millis(100);
-
 /// Silence that ends an answer, in addition to the time of some characters. USB adapters deliver bytes in batches,
 /// 16 ms apart and more.
 const BATCH: Duration = Duration::from_millis(60);
@@ -29,13 +26,10 @@ const STALE: usize = 16 * 1024;
 const SENDING: Duration = Duration::from_secs(2);
 
 /// Reads one register. The response never equals the request, so this shows whether an adapter returns what it sends.
-const PROBE: [u8; 5] = [
-    3,
-    (PRODUCT_CODE >> 8) as u8,
-    (PRODUCT_CODE & 0xFF) as u8,
-    0,
-    1,
-];
+const PROBE: [u8; 5] = {
+    let [high, low] = PRODUCT_CODE.to_be_bytes();
+    [3, high, low, 0, 1]
+};
 
 /// Number of bytes in front of a returned request that are tolerated, as in front of an answer.
 const NOISE: usize = 3;
@@ -83,10 +77,6 @@ pub struct Master {
 
 impl Master {
     /// Opens the line.
-    ///
-    /// # Errors
-    ///
-    /// When the line cannot be opened; the error says why.
     pub async fn open(endpoint: Endpoint, observer: Option<Observer>) -> Result<Self, Failure> {
         Ok(Self {
             stream: Stream::open(&endpoint).await?,
@@ -100,13 +90,11 @@ impl Master {
     }
 
     /// Returns the settings of the line.
-    #[must_use]
     pub const fn endpoint(&self) -> &Endpoint {
         &self.endpoint
     }
 
     /// Returns whether the adapter has returned what it sends.
-    #[must_use]
     pub const fn has_echo(&self) -> bool {
         matches!(self.echo, Some(true))
     }
@@ -116,11 +104,8 @@ impl Master {
         self.echo = Some(true);
     }
 
-    /// Changes rate, format and framing of the line.
-    ///
-    /// # Errors
-    ///
-    /// When the port does not support the settings. The line then keeps its present ones.
+    /// Changes rate, format and framing of the line. When the port does not support the settings, the line keeps its
+    /// present ones.
     pub fn change_line(&mut self, endpoint: Endpoint) -> Result<(), Failure> {
         self.stream.change(&endpoint)?;
         self.endpoint = endpoint;
@@ -133,12 +118,8 @@ impl Master {
         self.stream.discard_unsent();
     }
 
-    /// Sends a request to a unit, and repeats it as often as the endpoint says. Returns the PDU of the response,
-    /// which may be an exception.
-    ///
-    /// # Errors
-    ///
-    /// The failure of the last attempt, unless an earlier one was garbled.
+    /// Sends a request to a unit, and repeats it as often as the endpoint says. Returns the PDU of the response, which
+    /// may be an exception. The error is that of the last attempt, unless an earlier one was garbled.
     pub async fn ask(&mut self, unit: u8, pdu: &[u8]) -> Result<Vec<u8>, Lost> {
         if self.echo.is_none() && !differs(pdu) {
             self.look_for_echo(unit).await?;
@@ -168,17 +149,6 @@ impl Master {
             }
         }
         result
-    }
-
-    /// Sends a broadcast to all units.
-    ///
-    /// # Errors
-    ///
-    /// Errors of the port.
-    pub async fn tell_all(&mut self, pdu: &[u8]) -> io::Result<()> {
-        self.send(0, pdu).await?;
-        self.free = self.free.max(Instant::now() + TURNAROUND);
-        Ok(())
     }
 
     /// Sends a request when the line is free. Returns before the request has been sent completely.
@@ -243,10 +213,6 @@ impl Master {
     }
 
     /// Reads once, until `until` at most. Returns 0 when nothing was received.
-    ///
-    /// # Errors
-    ///
-    /// Errors of the port.
     pub async fn read_until(&mut self, until: Instant, into: &mut Vec<u8>) -> io::Result<usize> {
         let mut chunk = [0; 512];
         match timeout_at(until, self.stream.read(&mut chunk)).await {
@@ -281,14 +247,11 @@ impl Master {
         let mut until = last;
         loop {
             let never_silent = junk.len() + got.len() >= MOST || Instant::now() >= end;
-            let until_now = until.min(end);
-            if !never_silent
-                && self
-                    .read_until(until_now, &mut got)
-                    .await
-                    .map_err(Lost::Broken)?
-                    > 0
-            {
+            let read = match never_silent {
+                true => Ok(0),
+                false => self.read_until(until.min(end), &mut got).await,
+            };
+            if read.map_err(Lost::Broken)? > 0 {
                 returned = returned || self.drop_echo(&own, &mut got);
                 // A busy computer delivers an answer, or an echo, in pieces with a pause between them.
                 let mut all = [junk.as_slice(), &got].concat();
@@ -382,7 +345,6 @@ const fn differs(pdu: &[u8]) -> bool {
 mod tests {
     use super::*;
     use crate::bus::Place;
-    use modbus_line::Format;
 
     /// As a simulator that is stopped: its pseudo-terminal is full at some time.
     #[tokio::test]
@@ -391,16 +353,8 @@ mod tests {
             .openpty(portable_pty::PtySize::default())
             .unwrap();
         let port = pair.master.tty_name().unwrap();
-        let endpoint = Endpoint {
-            place: Place::Serial(port.to_str().unwrap().to_owned()),
-            baud: 9600,
-            format: Format::default(),
-            framing: Framing::Rtu,
-            unit: 1,
-            timeout: Duration::from_millis(10),
-            retries: 0,
-            timeout_given: true,
-        };
+        let place = Place::Serial(port.to_str().unwrap().to_owned());
+        let endpoint = Endpoint::new(place, Framing::Rtu);
         let mut master = Master::open(endpoint, None).await.unwrap();
         let error = loop {
             if let Err(error) = master.put(1, &[0x41; 253]).await {

@@ -14,7 +14,6 @@ pub use sweep::{Found, LONG, REPORT, SHORT};
 
 /// Returns whether an exception is the answer of a gateway for a unit that does not answer it (V1.1b3 chapter 7, codes
 /// 0A and 0B).
-#[must_use]
 pub const fn is_from_gateway(code: u8) -> bool {
     matches!(code, 0x0A | 0x0B)
 }

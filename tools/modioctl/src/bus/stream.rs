@@ -28,10 +28,6 @@ pub enum Stream {
 
 impl Stream {
     /// Opens the connection.
-    ///
-    /// # Errors
-    ///
-    /// When it cannot be opened; the error says why and what to do.
     pub async fn open(endpoint: &Endpoint) -> Result<Self, Failure> {
         match &endpoint.place {
             Place::Serial(path) => {
@@ -58,10 +54,6 @@ impl Stream {
     }
 
     /// Changes the settings of the line. Over TCP they are those of the gateway.
-    ///
-    /// # Errors
-    ///
-    /// When the port does not support them.
     pub fn change(&mut self, endpoint: &Endpoint) -> Result<(), Failure> {
         let (Self::Serial(port), Place::Serial(path)) = (self, &endpoint.place) else {
             return Ok(());
@@ -77,10 +69,6 @@ impl Stream {
     }
 
     /// Reads the available bytes, at least one. 0 bytes means that the other end has closed the connection.
-    ///
-    /// # Errors
-    ///
-    /// Errors of the port.
     pub async fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         match self {
             Self::Serial(port) => port.inner.read(bytes).await,
@@ -99,10 +87,6 @@ impl Stream {
     }
 
     /// Writes all bytes.
-    ///
-    /// # Errors
-    ///
-    /// Errors of the port.
     pub async fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
         match self {
             Self::Serial(port) => port.inner.write_all(bytes).await,

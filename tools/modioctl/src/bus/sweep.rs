@@ -81,10 +81,6 @@ enum Turn {
 impl Master {
     /// Asks these addresses, except those that are already found. Each has the time `wait` to begin its answer. Calls
     /// `asked` with each address.
-    ///
-    /// # Errors
-    ///
-    /// Errors of the port.
     pub async fn sweep(
         &mut self,
         units: &[u8],
@@ -147,7 +143,6 @@ impl Master {
         Ok(())
     }
 
-    /// Asks one address.
     async fn offer(
         &mut self,
         unit: u8,

@@ -7,10 +7,6 @@ use crate::output;
 use crate::value::table_name;
 
 /// Lists the unit's points and registers.
-///
-/// # Errors
-///
-/// When the unit does not answer or refuses.
 pub async fn run(device: &mut Device, json: bool) -> Result<(), Failure> {
     let learned = fetch(device).await?;
     let about = learned.book.of_modio()?;

@@ -7,13 +7,9 @@ use crate::failure::Failure;
 use crate::output;
 
 /// Writes a configuration of another system for the unit, or for several units of the line.
-///
-/// # Errors
-///
-/// When the unit does not answer, when the system cannot use the endpoint, or when the file cannot be written.
 pub async fn run(device: &mut Device, options: &Export) -> Result<(), Failure> {
     let only = [device.unit];
-    let addresses = options.units.as_ref().map_or(&only[..], |units| &units.0);
+    let addresses = options.units.as_deref().unwrap_or(&only);
     let mut units = Vec::new();
     for address in addresses {
         device.unit = *address;

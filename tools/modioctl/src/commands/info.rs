@@ -30,7 +30,6 @@ const GROUPS: [&str; 7] = [
     "identity", "line", "modules", "state", "faults", "counters", "others",
 ];
 
-/// Returns the group of the register at this address.
 const fn group(address: u16) -> &'static str {
     match address {
         BAUD..=FRAME_GAP | state::UNIT_ADDRESS => "line",
@@ -49,10 +48,6 @@ const fn group(address: u16) -> &'static str {
 }
 
 /// Shows identity, state and counters of the unit.
-///
-/// # Errors
-///
-/// When the unit does not answer or refuses.
 pub async fn run(device: &mut Device, json: bool) -> Result<(), Failure> {
     let mut identity = match identity(device).await {
         Err(Unidentified::Lost(lost)) => return Err(device.lost(&lost)),
@@ -122,7 +117,6 @@ pub enum Unidentified {
     Exception(u8),
     /// The answer contains no objects, or wrong lengths.
     Damaged,
-    /// There is no answer.
     Lost(Lost),
 }
 
@@ -140,10 +134,6 @@ impl fmt::Display for Unidentified {
 }
 
 /// Returns the objects of the device identification.
-///
-/// # Errors
-///
-/// The reason why there are none.
 pub async fn identity(device: &mut Device) -> Result<Vec<(String, String)>, Unidentified> {
     let mut found = Vec::new();
     let mut object = 0;
@@ -178,17 +168,15 @@ pub async fn identity(device: &mut Device) -> Result<Vec<(String, String)>, Unid
 
 #[cfg(test)]
 mod tests {
-    use modio_description::describe;
     use register_map::Module;
     use register_map::board::MODIO_08;
 
     use super::*;
-    use crate::names::Book;
+    use crate::names::book;
 
     #[test]
     fn every_register_has_a_group_and_reserved_ones_are_not_shown() {
-        let description = describe(&MODIO_08, "0.1.0", |_| Module::Ai4);
-        let book = Book::new(description, vec![(0, 0); 32]);
+        let book = book(&MODIO_08, Module::Ai4, (0, 0));
         let shown = |name: &str| {
             let item = book.find(name).unwrap();
             is_state(&item).then(|| group(item.address))

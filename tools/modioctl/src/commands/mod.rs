@@ -29,10 +29,6 @@ use config::Note;
 const INTERRUPTED: u8 = 130;
 
 /// Runs the command of the command line, until it is done or Ctrl-C is pressed.
-///
-/// # Errors
-///
-/// The reason why the command failed.
 pub async fn run(mut cli: Cli) -> Result<ExitCode, Failure> {
     let until_stopped = matches!(
         cli.command,
@@ -79,14 +75,14 @@ async fn dispatch(mut cli: Cli, note: &Note) -> Result<(), Failure> {
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "modioctl", &mut script);
-            return output::line(format_args!("{}", String::from_utf8_lossy(&script)));
+            return output::line(String::from_utf8_lossy(&script));
         }
         Command::Man => {
             let mut page = Vec::new();
             clap_mangen::Man::new(Cli::command())
                 .render(&mut page)
                 .map_err(Failure::usage)?;
-            return output::line(format_args!("{}", String::from_utf8_lossy(&page)));
+            return output::line(String::from_utf8_lossy(&page));
         }
         _ => {}
     }

@@ -11,10 +11,6 @@ use crate::output;
 use crate::value::{parse, show};
 
 /// Sets up a slot for a module.
-///
-/// # Errors
-///
-/// When the unit does not have the port or the module, does not answer or refuses.
 pub async fn run(mut device: Device, options: Module) -> Result<(), Failure> {
     let Module::Set { port, module } = options;
     let book = fetch(&mut device).await?.book;
@@ -44,10 +40,8 @@ pub async fn run(mut device: Device, options: Module) -> Result<(), Failure> {
     tokio::time::sleep(std::time::Duration::from_millis(300)).await;
     let fares = book.find(&format!("p{port}.module_state"))?;
     let state = device.read_items(std::slice::from_ref(&fares)).await?;
-    let state = state
-        .first()
-        .map(|words| show(&fares, words, false).text)
-        .unwrap_or_default();
+    let state = state.first().map(|words| show(&fares, words, false).text);
+    let state = state.unwrap_or_default();
     output::line(format_args!(
         "port {port}: {}, saved and in force; state: {state}",
         show(&item, &words, false)
@@ -55,41 +49,23 @@ pub async fn run(mut device: Device, options: Module) -> Result<(), Failure> {
 }
 
 /// Restarts the unit.
-///
-/// # Errors
-///
-/// When the unit does not answer or refuses.
 pub async fn reboot(mut device: Device) -> Result<(), Failure> {
     device.unlock().await?;
     device.warn_of_restart().await?;
     let mut device = device.restart().await?;
-    let words = device
-        .read_words(state::MODULE_STATE, points::PORTS)
-        .await?;
-    let bad = words.iter().any(|state| *state > 1);
-    output::line(format_args!(
-        "restarted{}",
-        if bad {
-            "; a module has a fault, see `modioctl info`"
-        } else {
-            ""
-        }
-    ))
+    let states = device.read_words(state::MODULE_STATE, points::PORTS);
+    let bad = states.await?.iter().any(|state| *state > 1);
+    output::line(match bad {
+        true => "restarted; a module has a fault, see `modioctl info`",
+        false => "restarted",
+    })
 }
 
 /// Makes the unit blink its LEDs.
-///
-/// # Errors
-///
-/// When the unit does not answer or refuses.
 pub async fn identify(device: &mut Device) -> Result<(), Failure> {
     device.unlock().await?;
-    device
-        .order(
-            Command::Identify.code(),
-            "blinking (older firmware does not support it)",
-        )
-        .await?;
+    let about = "blinking (older firmware does not support it)";
+    device.order(Command::Identify.code(), about).await?;
     output::line(format_args!(
         "all LEDs of unit {} blink for 10 s",
         device.unit

@@ -7,10 +7,6 @@ use crate::failure::Failure;
 use crate::output;
 
 /// Lists the serial ports with the known data of their adapters.
-///
-/// # Errors
-///
-/// When the system does not list its ports.
 pub fn run(json: bool) -> Result<(), Failure> {
     let ports = available_ports().map_err(|error| {
         Failure::Port(format!(
@@ -24,7 +20,7 @@ pub fn run(json: bool) -> Result<(), Failure> {
         return output::json(&each.collect::<Vec<_>>());
     }
     if ports.is_empty() {
-        return output::line(format_args!("no serial ports: is the adapter plugged in?"));
+        return output::line("no serial ports: is the adapter plugged in?");
     }
     let rows: Vec<_> = ports
         .iter()

@@ -7,26 +7,16 @@ use crate::failure::Failure;
 use crate::output;
 
 /// Sends a PDU and shows both frames.
-///
-/// # Errors
-///
-/// When the digits are wrong, the unit does not answer, or the answer is an exception.
 pub async fn run(device: &mut Device, options: &Raw) -> Result<(), Failure> {
     let pdu = hex(&options.pdu.concat())?;
     let framing = device.master.endpoint().framing;
-    output::line(format_args!(
-        "-> {}  {}",
-        adu::bytes(framing, &framing.frame(0, device.unit, &pdu)),
-        decode::request(&pdu)
-    ))?;
+    let sent = adu::bytes(framing, &framing.frame(0, device.unit, &pdu));
+    output::line(format_args!("-> {sent}  {}", decode::request(&pdu)))?;
     match device.master.ask(device.unit, &pdu).await {
         Ok(answer) => {
-            let frame = framing.frame(0, device.unit, &answer);
-            output::line(format_args!(
-                "<- {}  {}",
-                adu::bytes(framing, &frame),
-                decode::response(&answer, Some(&pdu))
-            ))?;
+            let frame = adu::bytes(framing, &framing.frame(0, device.unit, &answer));
+            let words = decode::response(&answer, Some(&pdu));
+            output::line(format_args!("<- {frame}  {words}"))?;
             match answer[..] {
                 [function, code] if function & 0x80 != 0 => {
                     Err(device.exception(code, "the request"))
@@ -35,10 +25,8 @@ pub async fn run(device: &mut Device, options: &Raw) -> Result<(), Failure> {
             }
         }
         Err(Lost::Garbled(bytes)) => {
-            output::line(format_args!(
-                "<- {}  not an answer to this request",
-                adu::bytes(framing, &bytes)
-            ))?;
+            let shown = adu::bytes(framing, &bytes);
+            output::line(format_args!("<- {shown}  not an answer to this request"))?;
             Err(device.lost(&Lost::Garbled(bytes)))
         }
         Err(lost) => Err(device.lost(&lost)),

@@ -10,25 +10,13 @@ use crate::output;
 use crate::value::show;
 
 /// Reads items by name or address.
-///
-/// # Errors
-///
-/// When a name is unknown, or the unit does not answer or refuses.
 pub async fn run(device: &mut Device, options: &Read, json: bool) -> Result<(), Failure> {
     let book = fetch(device).await?.book;
-    let items: Vec<Item> = options
-        .names
-        .iter()
-        .map(|name| book.find(name))
-        .collect::<Result<_, _>>()?;
+    let items = book.find_all(&options.names)?;
     print(device, &items, options.raw, json).await
 }
 
 /// Reads items and prints their values. With `raw` they are numbers without meaning.
-///
-/// # Errors
-///
-/// When the unit does not answer or refuses.
 pub async fn print(
     device: &mut Device,
     items: &[Item],
@@ -47,7 +35,6 @@ pub async fn print(
     output::table(&rows)
 }
 
-/// Returns an item with its value, for programs.
 fn as_json(item: &Item, words: &[u16], raw: bool) -> Json {
     let shown = show(item, words, raw);
     json!({

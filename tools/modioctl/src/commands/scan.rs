@@ -18,7 +18,6 @@ use crate::output;
 /// Shortest time that is worth an announcement.
 const LONG_SCAN: Duration = Duration::from_secs(10);
 
-/// A unit that was found.
 struct Unit {
     address: u8,
     line: Endpoint,
@@ -35,17 +34,12 @@ struct Scanned {
     never_silent: Vec<String>,
     /// Units that answered at the rate and format of `place` and have not been looked at.
     found: Found,
-    /// The present line.
     line: Option<Endpoint>,
     echo: bool,
 }
 
 /// Looks for units at the requested rates and formats. Ctrl-C ends the scan, and keeps what was found. Returns whether
-/// the scan has ended by itself.
-///
-/// # Errors
-///
-/// When no unit was found, or when only garbled answers were received.
+/// the scan has ended by itself. Fails when no unit was found.
 pub async fn run(
     endpoint: Endpoint,
     observer: Option<Observer>,
@@ -59,7 +53,7 @@ pub async fn run(
         ));
     }
     let lines = lines(&endpoint, options);
-    if let Some(time) = announcement(&lines, options.units.0.len()) {
+    if let Some(time) = announcement(&lines, options.units.len()) {
         eprintln!("modioctl: {time}");
     }
     let mut scanned = Scanned::default();
@@ -68,7 +62,7 @@ pub async fn run(
         // Ctrl-C is handled before the scan begins.
         biased;
         _ = tokio::signal::ctrl_c() => false,
-        result = search(lines, observer, &options.units.0, &bar, &mut scanned) => {
+        result = search(lines, observer, &options.units, &bar, &mut scanned) => {
             result?;
             true
         }
@@ -87,10 +81,9 @@ pub async fn run(
         )),
         (true, true) => Err(Failure::NoAnswer(format!(
             "no unit found{}: check power, wiring (A and B swapped?) and rate (`--rates all`); a unit's address is its DIP switch; a unit with a long RESPONSE_DELAY or over the air needs a longer `--timeout`",
-            if scanned.echo {
-                ", and the adapter returns what it sends, which is not an answer"
-            } else {
-                ""
+            match scanned.echo {
+                true => ", and the adapter returns what it sends, which is not an answer",
+                false => "",
             }
         ))),
     }
@@ -99,10 +92,8 @@ pub async fn run(
 /// Returns the lines to try: each rate with each format. RTU needs 8 data bits, so formats with 7 are tried in ASCII
 /// mode.
 fn lines(endpoint: &Endpoint, options: &Scan) -> Vec<Endpoint> {
-    let rates = options.rates.as_ref();
-    let rates = rates.map_or(vec![endpoint.baud], |rates| rates.0.clone());
-    let formats = options.formats.as_ref();
-    let formats = formats.map_or(vec![endpoint.format], |formats| formats.0.clone());
+    let rates = options.rates.clone().unwrap_or(vec![endpoint.baud]);
+    let formats = options.formats.clone().unwrap_or(vec![endpoint.format]);
     let line = |baud, format: Format| Endpoint {
         baud,
         format,
@@ -213,11 +204,8 @@ async fn sweep(
         return Ok(());
     }
     bar.inc_length(silent.len() as u64);
-    bar.set_message(
-        format!("{line} silent addresses, {LONG:?} each")
-            .trim()
-            .to_owned(),
-    );
+    let message = format!("{line} silent addresses, {LONG:?} each");
+    bar.set_message(message.trim().to_owned());
     let sweep = master.sweep(&silent, LONG, found, asked);
     sweep.await.map_err(lost)
 }
@@ -266,11 +254,8 @@ impl Scanned {
     }
 }
 
-/// Reads the identity of a unit.
-///
-/// # Errors
-///
-/// When its answers are garbled, as those of two units with one address are, or when the port is lost.
+/// Reads the identity of a unit. Fails when its answers are garbled, as those of two units with one address are, or
+/// when the port is lost.
 async fn look_at(device: &mut Device) -> Result<Unit, Failure> {
     // Use what the unit does answer, even if it does not answer every request.
     fn answered<T: Default>(result: Result<T, Failure>) -> Result<T, Failure> {
@@ -294,21 +279,17 @@ async fn look_at(device: &mut Device) -> Result<Unit, Failure> {
         Err(reason) => format!("no identification: {reason}"),
     };
     let description = answered(known(device).await)?;
-    let modules = match description {
-        None => String::new(),
-        Some(description) => {
-            let ports = description.ports.iter().map(|port| {
-                let name = module_name(&description, port.module);
-                format!("p{} {name}", port.number)
-            });
-            ports.collect::<Vec<_>>().join(", ")
-        }
-    };
+    let mut modules = Vec::new();
+    if let Some(unit) = &description {
+        let ports = unit.ports.iter();
+        let named = ports.map(|port| (port.number, module_name(unit, port.module)));
+        modules.extend(named.map(|(port, name)| format!("p{port} {name}")));
+    }
     Ok(Unit {
         address: device.unit,
         line: device.master.endpoint().clone(),
         identity,
-        modules,
+        modules: modules.join(", "),
     })
 }
 
@@ -339,12 +320,8 @@ fn print(scanned: &Scanned, serial: bool, json: bool) -> Result<(), Failure> {
                 (true, Framing::Ascii) => format!("{baud} {format} ASCII"),
                 (true, _) => format!("{baud} {format}"),
             };
-            [
-                unit.address.to_string(),
-                line,
-                unit.identity.clone(),
-                unit.modules.clone(),
-            ]
+            let (identity, modules) = (unit.identity.clone(), unit.modules.clone());
+            [unit.address.to_string(), line, identity, modules]
         })
         .collect();
     if !rows.is_empty() {
@@ -354,9 +331,8 @@ fn print(scanned: &Scanned, serial: bool, json: bool) -> Result<(), Failure> {
         output::line(format_args!("the line is never silent at {at}"))?;
     }
     for at in garbled {
-        output::line(format_args!(
-            "something answers, but garbled, at address {at}"
-        ))?;
+        let what = "something answers, but garbled, at address";
+        output::line(format_args!("{what} {at}"))?;
     }
     Ok(())
 }
@@ -386,7 +362,7 @@ mod tests {
             panic!("not a scan");
         };
         let endpoint = cli.endpoint.endpoint(None, None).unwrap();
-        (lines(&endpoint, &options), options.units.0.len())
+        (lines(&endpoint, &options), options.units.len())
     }
 
     #[test]

@@ -26,10 +26,6 @@ const BATCH: Duration = Duration::from_millis(60);
 const ASCII_IDLE: Duration = Duration::from_secs(1);
 
 /// Shows the frames on the line until the program is stopped. Sends nothing.
-///
-/// # Errors
-///
-/// When the line cannot be opened or is lost, or when the capture file cannot be written.
 pub async fn run(endpoint: &Endpoint, options: &Sniff, json: bool) -> Result<(), Failure> {
     if matches!(endpoint.place, Place::ModbusTcp(_)) {
         return Err(Failure::usage(
@@ -124,9 +120,9 @@ impl Printer {
             self.last = Some(piece.until);
             if self.json {
                 let time = self.wall + piece.from;
-                output::line(format_args!("{}", object(self.framing, piece, time, gap)))?;
+                output::line(object(self.framing, piece, time, gap))?;
             } else {
-                output::line(format_args!("{}", line(self.framing, piece, gap)))?;
+                output::line(line(self.framing, piece, gap))?;
             }
             if let Some((recorder, path)) = &mut self.record {
                 let since = self.wall.timestamp_nanos_opt().unwrap_or_default();
@@ -152,7 +148,6 @@ fn milliseconds(time: Duration) -> f64 {
     (time.as_secs_f64() * 1e4).round() / 10.0
 }
 
-/// Returns a piece in words, for people.
 fn words(framing: Framing, piece: &Piece) -> String {
     match &piece.kind {
         Kind::Garbled => format!("garbled: {}", decode::count_of(&piece.bytes)),
@@ -167,16 +162,13 @@ fn words(framing: Framing, piece: &Piece) -> String {
 
 /// Returns a piece as a line: time in s, gap in ms, direction, bytes, words, turnaround in ms.
 fn line(framing: Framing, piece: &Piece, gap: Option<Duration>) -> String {
-    let gap = gap.map_or_else(
-        || "-".to_owned(),
-        |gap| format!("+{:.1}", milliseconds(gap)),
-    );
+    let gap = gap.map(|gap| format!("+{:.1}", milliseconds(gap)));
+    let gap = gap.unwrap_or_else(|| "-".to_owned());
     let text = match &piece.kind {
-        Kind::Garbled => format!(
-            "?? {}  {}",
-            adu::bytes(Framing::Rtu, &piece.bytes),
-            words(framing, piece)
-        ),
+        Kind::Garbled => {
+            let bytes = adu::bytes(Framing::Rtu, &piece.bytes);
+            format!("?? {bytes}  {}", words(framing, piece))
+        }
         Kind::Frame {
             direction, request, ..
         } => {
@@ -191,7 +183,6 @@ fn line(framing: Framing, piece: &Piece, gap: Option<Duration>) -> String {
     format!("{seconds:9.3} {gap:>9} ms {text}{turnaround}")
 }
 
-/// Returns a piece as a JSON object.
 fn object(framing: Framing, piece: &Piece, time: DateTime<Local>, gap: Option<Duration>) -> Json {
     let (kind, unit, function) = match &piece.kind {
         Kind::Garbled => ("garbled", None, None),

@@ -12,10 +12,6 @@ use crate::output::{self, csv_field};
 use crate::value::{Shown, show};
 
 /// Prints values until it is stopped. Waits for a unit that is lost.
-///
-/// # Errors
-///
-/// When a name is unknown, or when the unit refuses.
 pub async fn run(mut device: Device, options: &Watch) -> Result<(), Failure> {
     let items = chosen(&fetch(&mut device).await?.book, &options.names)?;
     if options.csv {
@@ -69,13 +65,9 @@ async fn reconnect(device: Device, endpoint: crate::bus::Endpoint) -> Device {
 }
 
 /// Returns the items with these names, or all points without names.
-///
-/// # Errors
-///
-/// When a name is unknown, or when there are no points.
 pub fn chosen(book: &Book, names: &[String]) -> Result<Vec<Item>, Failure> {
     if !names.is_empty() {
-        return names.iter().map(|name| book.find(name)).collect();
+        return book.find_all(names);
     }
     let points: Vec<_> = book.points().cloned().collect();
     if points.is_empty() {
@@ -103,11 +95,10 @@ fn print(
             .map(|(item, shown)| (item.name.clone(), shown.json.clone()))
             .collect();
         object.insert("time".to_owned(), json!(time));
-        return output::line(format_args!("{}", Json::from(object)));
+        return output::line(Json::from(object));
     }
-    let values: Vec<_> = both
-        .map(|(item, shown)| format!("{} {shown}", item.name))
-        .collect();
+    let values = both.map(|(item, shown)| format!("{} {shown}", item.name));
+    let values: Vec<_> = values.collect();
     output::line(format_args!(
         "{}  {}",
         now.format("%H:%M:%S%.3f"),

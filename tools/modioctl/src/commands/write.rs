@@ -9,11 +9,8 @@ use crate::names::Item;
 use crate::output;
 use crate::value::{parse, show};
 
-/// Writes items by name or address, after all of them have been checked.
-///
-/// # Errors
-///
-/// When a name or a value is wrong; nothing is written then. When the unit does not answer or refuses.
+/// Writes items by name or address, after all of them have been checked. When a name or a value is wrong, nothing is
+/// written.
 pub async fn run(device: &mut Device, options: &Write) -> Result<(), Failure> {
     let book = fetch(device).await?.book;
     let mut checked = Vec::new();
@@ -22,10 +19,8 @@ pub async fn run(device: &mut Device, options: &Write) -> Result<(), Failure> {
         let words = parse(&item, text, options.raw)?;
         checked.push((item, words));
     }
-    if checked
-        .iter()
-        .any(|(item, _)| item.setting || item.name == "COMMAND")
-    {
+    let is_locked = |item: &Item| item.setting || item.name == "COMMAND";
+    if checked.iter().any(|(item, _)| is_locked(item)) {
         device.unlock().await?;
     }
     let settings = checked.iter().filter(|(item, _)| item.setting);
@@ -41,24 +36,17 @@ pub async fn run(device: &mut Device, options: &Write) -> Result<(), Failure> {
         } else {
             ""
         };
-        output::line(format_args!(
-            "{} = {}{when}",
-            item.name,
-            show(item, words, options.raw)
-        ))?;
+        let value = show(item, words, options.raw);
+        output::line(format_args!("{} = {value}{when}", item.name))?;
     }
     if unsaved {
-        output::line(format_args!("not saved: save with `modioctl config save`"))?;
+        output::line("not saved: save with `modioctl config save`")?;
     }
     Ok(())
 }
 
 impl Device {
     /// Writes an item.
-    ///
-    /// # Errors
-    ///
-    /// When the unit does not answer or refuses.
     pub async fn write_item(&mut self, item: &Item, words: &[u16]) -> Result<(), Failure> {
         let about = format!("writing {}", item.name);
         match (item.table, words) {

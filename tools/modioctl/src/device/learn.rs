@@ -29,10 +29,6 @@ pub struct Learned {
 }
 
 /// Learns the names of a unit. A unit that is not a modio has no names, only addresses.
-///
-/// # Errors
-///
-/// When the unit does not answer, or when its description cannot be read.
 pub async fn fetch(device: &mut Device) -> Result<Learned, Failure> {
     let Some((description, source)) = description(device).await? else {
         return Ok(Learned {
@@ -53,13 +49,8 @@ async fn description(device: &mut Device) -> Result<Option<(Description, String)
         return Ok(None);
     }
     let known = known(device).await?;
-    let own = match device.read_words(state::DESCRIPTION_CRC, 1).await {
-        Ok(words) => words.first().copied(),
+    let Some([own]) = read(device, state::DESCRIPTION_CRC).await? else {
         // The firmware is too old to describe itself.
-        Err(Failure::Refused(_)) => None,
-        Err(failure) => return Err(failure),
-    };
-    let Some(own) = own else {
         return Ok(known.map(|known| (known, "this program: the unit has none".to_owned())));
     };
     let same = |description: &Description| checksum(&description.encode()) == own;
@@ -89,17 +80,9 @@ async fn description(device: &mut Device) -> Result<Option<(Description, String)
 
 /// Returns what this program knows about the unit from its own register map, without asking for the unit's
 /// description; `None` for a unit that is not a modio, or whose board is newer than this program.
-///
-/// # Errors
-///
-/// When the unit does not answer.
 pub async fn known(device: &mut Device) -> Result<Option<Description>, Failure> {
-    let head = match device.read_words(state::PRODUCT_CODE, 6).await {
-        Ok(head) => head,
-        Err(Failure::Refused(_)) => return Ok(None),
-        Err(failure) => return Err(failure),
-    };
-    let [high, low, version, patch, _, code] = head[..] else {
+    let head = read(device, state::PRODUCT_CODE).await?;
+    let Some([high, low, version, patch, _, code]) = head else {
         return Ok(None);
     };
     let product = u32::from(high) << 16 | u32::from(low);
@@ -118,9 +101,18 @@ pub async fn known(device: &mut Device) -> Result<Option<Description>, Failure> 
 }
 
 async fn is_modio(device: &mut Device) -> Result<bool, Failure> {
-    match device.read_words(state::PRODUCT_CODE, 2).await {
-        Ok(words) => Ok(words == [(state::PRODUCT >> 16) as u16, state::PRODUCT as u16]),
-        Err(Failure::Refused(_)) => Ok(false),
+    let words = read(device, state::PRODUCT_CODE).await?;
+    Ok(words == Some([(state::PRODUCT >> 16) as u16, state::PRODUCT as u16]))
+}
+
+/// Reads registers; `None` for a unit that refuses.
+async fn read<const N: usize>(
+    device: &mut Device,
+    first: u16,
+) -> Result<Option<[u16; N]>, Failure> {
+    match device.read_words(first, N as u16).await {
+        Ok(words) => Ok(words.try_into().ok()),
+        Err(Failure::Refused(_)) => Ok(None),
         Err(failure) => Err(failure),
     }
 }
@@ -165,12 +157,9 @@ async fn readings(
         let register = description.registers.iter().find(|r| r.name == name);
         register.map_or(known, |register| register.address)
     };
-    let ranges = device
-        .read_words(address("RANGE", RANGE), points::COUNT)
-        .await?;
-    let scales = device
-        .read_words(address("SCALE", SCALE), points::COUNT)
-        .await?;
+    let (range, scale) = (address("RANGE", RANGE), address("SCALE", SCALE));
+    let ranges = device.read_words(range, points::COUNT).await?;
+    let scales = device.read_words(scale, points::COUNT).await?;
     Ok(ranges.into_iter().zip(scales).collect())
 }
 
@@ -180,15 +169,13 @@ async fn path(device: &mut Device) -> Result<Option<PathBuf>, Failure> {
     let Ok(strategy) = etcetera::choose_base_strategy() else {
         return Ok(None);
     };
-    let mut words = Vec::new();
-    for (first, count) in [(state::UNIQUE_ID, 6), (state::FIRMWARE_VERSION, 2)] {
-        match device.read_words(first, count).await {
-            Ok(more) => words.extend(more),
-            Err(Failure::Refused(_)) => return Ok(None),
-            Err(failure) => return Err(failure),
-        }
-    }
-    let digits: String = words.iter().map(|word| format!("{word:04x}")).collect();
+    let identity: Option<[u16; 6]> = read(device, state::UNIQUE_ID).await?;
+    let version: Option<[u16; 2]> = read(device, state::FIRMWARE_VERSION).await?;
+    let (Some(identity), Some(version)) = (identity, version) else {
+        return Ok(None);
+    };
+    let words = identity.iter().chain(&version);
+    let digits: String = words.map(|word| format!("{word:04x}")).collect();
     let directory = strategy.cache_dir().join("modio");
     Ok(Some(directory.join(format!("description-{digits}.bin"))))
 }

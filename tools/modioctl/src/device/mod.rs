@@ -4,9 +4,10 @@ mod learn;
 mod orders;
 mod several;
 
+use modbus_line::adu::{pdu, words_of, write_words};
 use modbus_line::names;
 
-pub use learn::{Learned, fetch, known};
+pub use learn::{fetch, known};
 pub use orders::with_modules;
 
 use crate::bus::endpoint::{Endpoint, Place};
@@ -32,10 +33,6 @@ pub struct Device {
 
 impl Device {
     /// Opens the line to the endpoint's unit.
-    ///
-    /// # Errors
-    ///
-    /// When the line cannot be opened; the error says why.
     pub async fn open(endpoint: Endpoint, observer: Option<Observer>) -> Result<Self, Failure> {
         let unit = endpoint.unit;
         let master = Master::open(endpoint, observer).await?;
@@ -47,10 +44,6 @@ impl Device {
     }
 
     /// Sends a request. An exception is a failure; `about` describes the request in its text.
-    ///
-    /// # Errors
-    ///
-    /// When the unit does not answer or refuses.
     pub async fn ask(&mut self, pdu: &[u8], about: &str) -> Result<Vec<u8>, Failure> {
         match self.master.ask(self.unit, pdu).await {
             Ok(response) => match response[..] {
@@ -62,48 +55,32 @@ impl Device {
     }
 
     /// Reads registers from `first` on, by function 03.
-    ///
-    /// # Errors
-    ///
-    /// When the unit does not answer or refuses.
     pub async fn read_words(&mut self, first: u16, count: u16) -> Result<Vec<u16>, Failure> {
         let mut words = Vec::new();
         let mut done = 0;
         while done < count {
             let now = (count - done).min(MOST_WORDS);
             let from = first.wrapping_add(done);
-            let request = head(3, from, now);
             let about = format!("reading {}", span(from, now));
-            let response = self.ask(&request, &about).await?;
-            let (pairs, _) = response.get(2..).unwrap_or_default().as_chunks::<2>();
-            words.extend(pairs.iter().map(|pair| u16::from_be_bytes(*pair)));
+            let response = self.ask(&pdu(3, from, now), &about).await?;
+            words.extend(words_of(&response));
             done += now;
         }
         Ok(words)
     }
 
     /// Reads bits from `first` on, by function 01.
-    ///
-    /// # Errors
-    ///
-    /// When the unit does not answer or refuses.
     pub async fn read_bits(&mut self, first: u16, count: u16) -> Result<Vec<bool>, Failure> {
         let count = count.min(MOST_BITS);
-        let request = head(1, first, count);
         let about = format!("reading {}", span(first, count));
-        let response = self.ask(&request, &about).await?;
+        let response = self.ask(&pdu(1, first, count), &about).await?;
         let bytes = response.get(2..).unwrap_or_default();
-        let bits = bytes
-            .iter()
-            .flat_map(|byte| (0..8).map(move |bit| byte >> bit & 1 == 1));
+        let each = |byte: &u8| [0, 1, 2, 3, 4, 5, 6, 7].map(|bit| byte >> bit & 1 == 1);
+        let bits = bytes.iter().flat_map(each);
         Ok(bits.take(count.into()).collect())
     }
 
     /// Writes registers: a single one by function 06, several by function 10.
-    ///
-    /// # Errors
-    ///
-    /// When the unit does not answer or refuses; `about` describes the write.
     pub async fn write_words(
         &mut self,
         first: u16,
@@ -111,35 +88,24 @@ impl Device {
         about: &str,
     ) -> Result<(), Failure> {
         if let [word] = words {
-            self.ask(&head(6, first, *word), about).await?;
+            self.ask(&pdu(6, first, *word), about).await?;
             return Ok(());
         }
         for (n, words) in (0_u16..).zip(words.chunks(MOST_WRITTEN)) {
             let from = first.wrapping_add(n * MOST_WRITTEN as u16);
-            let mut request = head(0x10, from, words.len() as u16);
-            request.push(words.len() as u8 * 2);
-            request.extend(words.iter().flat_map(|word| word.to_be_bytes()));
-            self.ask(&request, about).await?;
+            self.ask(&write_words(from, words), about).await?;
         }
         Ok(())
     }
 
     /// Writes one bit, by function 05.
-    ///
-    /// # Errors
-    ///
-    /// When the unit does not answer or refuses; `about` describes the write.
     pub async fn write_bit(&mut self, address: u16, on: bool, about: &str) -> Result<(), Failure> {
         let word = if on { 0xFF00 } else { 0 };
-        self.ask(&head(5, address, word), about).await?;
+        self.ask(&pdu(5, address, word), about).await?;
         Ok(())
     }
 
     /// Reads records of a file, by function 14, as bytes.
-    ///
-    /// # Errors
-    ///
-    /// When the unit does not answer or refuses.
     pub async fn read_records(
         &mut self,
         file: u16,
@@ -147,11 +113,7 @@ impl Device {
         count: u16,
     ) -> Result<Vec<u8>, Failure> {
         let mut request = vec![0x14, 7, 6];
-        request.extend(
-            [file, first, count]
-                .iter()
-                .flat_map(|word| word.to_be_bytes()),
-        );
+        request.extend([file, first, count].map(u16::to_be_bytes).as_flattened());
         let about = format!("reading file {file}");
         let response = self.ask(&request, &about).await?;
         // After function, total length, length of the group and reference type.
@@ -159,14 +121,12 @@ impl Device {
     }
 
     /// Returns whether a change of the unit's line settings also concerns this computer's port.
-    #[must_use]
     pub const fn is_serial(&self) -> bool {
         self.master.endpoint().place.is_serial()
     }
 
     /// Returns the failure for an exception, with its meaning. An exception from a gateway means that the unit does not
     /// answer.
-    #[must_use]
     pub fn exception(&self, code: u8, about: &str) -> Failure {
         let unit = self.unit;
         if is_from_gateway(code) {
@@ -194,7 +154,6 @@ impl Device {
     }
 
     /// Returns the failure for a request without an answer.
-    #[must_use]
     pub fn lost(&self, lost: &Lost) -> Failure {
         let endpoint = self.master.endpoint();
         let unit = self.unit;
@@ -230,20 +189,12 @@ impl Device {
 }
 
 /// Describes an endpoint for people.
-#[must_use]
 pub fn place(endpoint: &Endpoint) -> String {
     match &endpoint.place {
         Place::Serial(path) => format!("{path}, {} bit/s {}", endpoint.baud, endpoint.format),
         Place::Tcp(address) => address.clone(),
         Place::ModbusTcp(address) => format!("{address} (Modbus TCP)"),
     }
-}
-
-fn head(function: u8, first: u16, second: u16) -> Vec<u8> {
-    let mut pdu = vec![function];
-    pdu.extend(first.to_be_bytes());
-    pdu.extend(second.to_be_bytes());
-    pdu
 }
 
 fn span(first: u16, count: u16) -> String {

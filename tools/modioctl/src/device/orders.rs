@@ -24,29 +24,17 @@ const PAUSE: Duration = Duration::from_millis(100);
 
 impl Device {
     /// Opens the lock of the settings, for a minute.
-    ///
-    /// # Errors
-    ///
-    /// When the unit does not answer or refuses.
     pub async fn unlock(&mut self) -> Result<(), Failure> {
         self.write_words(KEY, &[OPENING_KEY], "opening the lock")
             .await
     }
 
     /// Writes a command. The lock must be open.
-    ///
-    /// # Errors
-    ///
-    /// When the unit does not answer or refuses.
     pub async fn order(&mut self, command: u16, about: &str) -> Result<(), Failure> {
         self.write_words(COMMAND, &[command], about).await
     }
 
     /// Saves the settings, and waits until they are saved.
-    ///
-    /// # Errors
-    ///
-    /// When the unit does not answer or refuses.
     pub async fn save(&mut self) -> Result<(), Failure> {
         self.order(Command::Save.code(), "saving").await?;
         let until = Instant::now() + SAVING;
@@ -67,10 +55,6 @@ impl Device {
     /// Restarts the unit and waits until it answers. It may answer with the line settings that it had, because a restart
     /// loses what is not saved, and because a gateway in front of it keeps its own; or with those that its registers
     /// announce. Both are tried in turn. The lock must be open.
-    ///
-    /// # Errors
-    ///
-    /// When the unit does not answer or refuses.
     pub async fn restart(mut self) -> Result<Self, Failure> {
         let line = self.read_words(BAUD, 3).await?;
         let before = self.uptime().await?;
@@ -91,7 +75,7 @@ impl Device {
             } else {
                 format!("the unit now answers with {shown}: use that in your next command")
             };
-            output::line(format_args!("{text}"))?;
+            output::line(text)?;
         }
         Ok(self)
     }
@@ -155,15 +139,16 @@ impl Device {
 
     /// Prints a warning when a saved change waits for a restart that may be one of the line, and the connection is a
     /// gateway.
-    ///
-    /// # Errors
-    ///
-    /// When the unit does not answer or refuses.
     pub async fn warn_of_restart(&mut self) -> Result<(), Failure> {
-        let status = self.read_words(state::STATUS, 1).await?;
-        let waits = status.iter().any(|word| word & status::RESTART_NEEDED != 0);
+        let waits = self.waits_for_restart().await?;
         self.warn_of_line(waits.then_some(BAUD));
         Ok(())
+    }
+
+    /// Returns whether a saved setting takes effect after the next restart.
+    pub async fn waits_for_restart(&mut self) -> Result<bool, Failure> {
+        let words = self.read_words(state::STATUS, 1).await?;
+        Ok(words.iter().any(|word| word & status::RESTART_NEEDED != 0))
     }
 
     async fn uptime(&mut self) -> Result<u32, Failure> {
@@ -217,7 +202,6 @@ fn shown(endpoint: &Endpoint) -> String {
 }
 
 /// Returns the description with these modules in its slots, to which the settings by point belong.
-#[must_use]
 pub fn with_modules(
     mut description: Description,
     module: impl Fn(u8) -> Option<u16>,
@@ -237,20 +221,8 @@ mod tests {
 
     #[test]
     fn values_without_a_meaning_do_not_change_the_line() {
-        let serial = Endpoint {
-            place: Place::Serial("COM3".to_owned()),
-            baud: 9600,
-            format: modbus_line::Format::default(),
-            framing: Framing::Rtu,
-            unit: 1,
-            timeout: Duration::from_secs(1),
-            retries: 2,
-            timeout_given: false,
-        };
-        let tcp = Endpoint {
-            place: Place::Tcp("a:1".to_owned()),
-            ..serial.clone()
-        };
+        let serial = Endpoint::new(Place::Serial("COM3".to_owned()), Framing::Rtu);
+        let tcp = Endpoint::new(Place::Tcp("a:1".to_owned()), Framing::Rtu);
         let line = |now, words: [u16; 3]| announced(now, &words).map(|then| shown(&then));
         assert_eq!(line(&serial, [96, 0, 0]), None);
         assert_eq!(line(&serial, [0, 99, 99]), None);

@@ -14,10 +14,6 @@ const MOST: u16 = 120;
 
 impl Device {
     /// Reads items, consecutive ones in one request. Returns the words of each item, in the order of the items.
-    ///
-    /// # Errors
-    ///
-    /// When the unit does not answer or refuses.
     pub async fn read_items(&mut self, items: &[Item]) -> Result<Vec<Vec<u16>>, Failure> {
         let mut spans: Vec<(Table, u16, u16)> = items
             .iter()

@@ -182,7 +182,6 @@ pub fn text(line: Line<'_>) -> Result<String, Failure> {
     ))
 }
 
-/// A unit of a hub.
 #[derive(Clone, Copy)]
 struct Unit<'a> {
     name: &'a str,
@@ -329,17 +328,17 @@ struct Shown {
 }
 
 fn shown(scaling: &Scaling) -> Shown {
-    let (exponent, unit, device_class) = match scaling.unit.code.as_str() {
-        // Home Assistant does not support µA as a unit of current.
-        "uA" => (
-            scaling.unit.exponent.saturating_sub(3),
-            "mA",
-            Some("current"),
-        ),
-        "mV" => (scaling.unit.exponent, "mV", Some("voltage")),
-        "Cel" => (scaling.unit.exponent, "°C", Some("temperature")),
-        "s" => (scaling.unit.exponent, "s", Some("duration")),
-        code => (scaling.unit.exponent, unit_name(code), None),
+    let mut exponent = scaling.unit.exponent;
+    let (unit, device_class) = match scaling.unit.code.as_str() {
+        "uA" => {
+            // Home Assistant does not support µA as a unit of current.
+            exponent = exponent.saturating_sub(3);
+            ("mA", Some("current"))
+        }
+        "mV" => ("mV", Some("voltage")),
+        "Cel" => ("°C", Some("temperature")),
+        "s" => ("s", Some("duration")),
+        code => (unit_name(code), None),
     };
     // Home Assistant evaluates templates in many of its texts.
     let unit = unit.replace(['{', '}'], "_");

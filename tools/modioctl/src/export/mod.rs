@@ -9,7 +9,7 @@ mod json;
 mod node_red;
 mod telegraf;
 
-use modio_description::{Table, Unit, Value};
+use modio_description::{Table, Unit};
 
 use crate::bus::adu::Framing;
 use crate::bus::{Endpoint, Place};
@@ -57,10 +57,6 @@ pub struct Source {
 }
 
 /// Returns the text of a configuration.
-///
-/// # Errors
-///
-/// When a unit is not a modio, or when the system cannot use the endpoint.
 pub fn text(format: ExportFormat, line: Line<'_>) -> Result<String, Failure> {
     match format {
         ExportFormat::Csv => csv::text(line),
@@ -104,7 +100,6 @@ impl Line<'_> {
 }
 
 impl Source {
-    /// Returns the pulse counters of the inputs.
     fn counters(&self) -> impl Iterator<Item = &Item> {
         let is_input = |name: &str| {
             let mut points = self.book.points();
@@ -149,22 +144,14 @@ struct Scaling {
 
 impl Scaling {
     fn of(item: &Item) -> Self {
-        match &item.meaning {
-            Meaning::Analog(reading) => Self {
-                unit: reading.unit.clone(),
-                signed: reading.min < 0,
-                range: Some((reading.min, reading.max)),
-            },
-            Meaning::Value(Value::Number(unit) | Value::Long(unit)) => Self {
-                unit: unit.clone(),
-                signed: false,
-                range: None,
-            },
-            _ => Self {
-                unit: Unit::default(),
-                signed: false,
-                range: None,
-            },
+        let range = match &item.meaning {
+            Meaning::Analog(reading) => Some((reading.min, reading.max)),
+            _ => None,
+        };
+        Self {
+            unit: item.unit(),
+            signed: range.is_some_and(|(min, _)| min < 0),
+            range,
         }
     }
 
@@ -189,7 +176,6 @@ fn power(exponent: i8) -> f64 {
 }
 
 /// Returns whether a name may contain a character.
-#[must_use]
 pub const fn is_plain(c: char) -> bool {
     c.is_ascii_alphanumeric() || matches!(c, ' ' | '.' | '_' | '-')
 }

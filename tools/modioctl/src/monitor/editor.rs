@@ -2,7 +2,6 @@
 
 use modio_description::Reading;
 
-use crate::failure::Failure;
 use crate::names::{Item, Meaning};
 use crate::value::{Shown, parse, show};
 
@@ -38,7 +37,6 @@ pub enum Step {
 impl Editor {
     /// Opens the slider at the present value, or at the lowest value when the present one is not known. Returns
     /// `None` when the point is not an analog output.
-    #[must_use]
     pub fn new(item: &Item, words: Option<&[u16]>) -> Option<Self> {
         let Meaning::Analog(reading) = &item.meaning else {
             return None;
@@ -87,7 +85,6 @@ impl Editor {
     }
 
     /// Returns the position of the slider, from 0 (left) to 1 (right).
-    #[must_use]
     pub fn part(&self) -> f64 {
         let span = f64::from(self.reading.max) - f64::from(self.reading.min);
         (f64::from(self.position) - f64::from(self.reading.min)) / span
@@ -110,13 +107,11 @@ impl Editor {
     }
 
     /// Returns the value of the slider, for people.
-    #[must_use]
     pub fn shown(&self) -> Shown {
         show(&self.item, &[self.position as u16], false)
     }
 
     /// Returns the lowest and the highest value, for people.
-    #[must_use]
     pub fn ends(&self) -> [Shown; 2] {
         [self.reading.min, self.reading.max].map(|end| show(&self.item, &[end as u16], false))
     }
@@ -127,34 +122,22 @@ impl Editor {
         if self.typed.is_empty() {
             return Some(vec![self.position as u16]);
         }
-        match parse(&self.item, &self.typed, false) {
-            Ok(words) => Some(words),
-            Err(Failure::Usage(text)) => {
-                self.wrong = Some(text);
-                None
-            }
-            Err(failure) => {
-                self.wrong = Some(failure.to_string());
-                None
-            }
-        }
+        parse(&self.item, &self.typed, false)
+            .map_err(|failure| self.wrong = Some(failure.to_string()))
+            .ok()
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use modio_description::describe;
     use register_map::Module;
     use register_map::board::MODIO_02;
 
     use super::*;
-    use crate::names::Book;
+    use crate::names::book;
 
     fn editor(now: Option<&[u16]>) -> Editor {
-        let book = Book::new(
-            describe(&MODIO_02, "0.1.0", |_| Module::Ao4),
-            vec![(1, 1); 32],
-        );
+        let book = book(&MODIO_02, Module::Ao4, (1, 1));
         Editor::new(&book.find("p5.1").unwrap(), now).unwrap()
     }
 
@@ -189,9 +172,6 @@ mod tests {
                 .contains("4000 to 20000 µA")
         );
         editor.rub_out();
-        for character in "00".chars() {
-            editor.type_in(character);
-        }
         editor.typed = "12345".to_owned();
         assert_eq!(editor.words(), Some(vec![12_345]));
         editor.slide(1, Step::Least);
@@ -204,10 +184,7 @@ mod tests {
 
     #[test]
     fn only_analog_outputs_have_a_slider() {
-        let book = Book::new(
-            describe(&MODIO_02, "0.1.0", |_| Module::Ai4),
-            vec![(1, 1); 32],
-        );
+        let book = book(&MODIO_02, Module::Ai4, (1, 1));
         assert!(Editor::new(&book.find("p5.1").unwrap(), None).is_none());
         assert!(Editor::new(&book.find("BAUD").unwrap(), None).is_none());
     }

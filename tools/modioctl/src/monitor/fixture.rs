@@ -2,29 +2,22 @@
 
 use std::time::Duration;
 
-use modio_description::describe;
+use register_map::Module;
 use register_map::board::MODIO_02;
-use register_map::{Board, Module};
 use tokio::time::Instant;
 
 use super::messages::{Polled, Update};
 use super::model::Model;
 use super::plan::Words;
-use crate::names::Book;
+use crate::names::book;
 
 /// Interval of polling in tests.
 pub const EVERY: Duration = Duration::from_millis(250);
 
-/// Returns the names of a unit with this module in every slot. RANGE and SCALE of every point are the same.
-pub fn book(board: &Board, module: Module, range: u16, scale: u16) -> Book {
-    let readings = vec![(range, scale); 32];
-    Book::new(describe(board, "0.1.0", |_| module), readings)
-}
-
 /// Returns a display of a modio-02 with this module, in mA or V, before the first reading.
 pub fn model(module: Module, now: Instant) -> Model {
     let mut model = Model::new("/dev/ttyUSB0, 9600 bit/s 8N2".to_owned(), 1, EVERY, now);
-    let book = Box::new(book(&MODIO_02, module, 1, 1));
+    let book = Box::new(book(&MODIO_02, module, (1, 1)));
     model.update(Update::Learned(book), now);
     model
 }

@@ -28,7 +28,6 @@ pub struct Entry {
 #[derive(Clone, Debug, Default)]
 pub struct Frames {
     entries: VecDeque<Entry>,
-    /// Number of frames that have been removed.
     removed: usize,
     /// Number of frames in front of the first one that is not shown; `None` when the newest frame is shown.
     end: Option<usize>,
@@ -65,7 +64,6 @@ pub struct Counts {
 
 impl Counts {
     /// Returns the mean time from a request to the end of its response.
-    #[must_use]
     pub fn mean(&self) -> Option<Duration> {
         self.sum.0.checked_div(self.sum.1)
     }
@@ -119,13 +117,11 @@ impl Frames {
     }
 
     /// Returns the number of frames since the start.
-    #[must_use]
     pub fn total(&self) -> usize {
         self.removed + self.entries.len()
     }
 
     /// Returns the number of frames after the last one that is shown.
-    #[must_use]
     pub fn below(&self) -> usize {
         self.end.map_or(0, |end| self.total().saturating_sub(end))
     }

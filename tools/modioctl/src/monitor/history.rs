@@ -28,7 +28,6 @@ impl History {
 
     /// Returns lines of the chart: seconds before `now`, as negative numbers, with the values. A pause longer than
     /// `gap` ends a line, so that the chart shows a gap.
-    #[must_use]
     pub fn lines(&self, now: Instant, gap: Duration) -> Vec<Vec<(f64, f64)>> {
         let mut lines: Vec<Vec<(f64, f64)>> = Vec::new();
         let mut before: Option<Instant> = None;
@@ -50,7 +49,6 @@ impl History {
 }
 
 /// Returns the lowest and the highest value of lines.
-#[must_use]
 pub fn extent(lines: &[Vec<(f64, f64)>]) -> Option<(f64, f64)> {
     let mut values = lines.iter().flatten().map(|(_, value)| *value);
     let first = values.next()?;

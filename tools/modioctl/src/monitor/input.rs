@@ -10,7 +10,6 @@ use super::editor::Step;
 use super::layout::{Parts, Slider};
 use super::messages::Write;
 use super::model::{Focus, Model, Page};
-use super::tree::Row;
 
 /// Rows per step of the mouse wheel.
 const WHEEL: isize = 3;
@@ -20,9 +19,7 @@ const WHEEL: isize = 3;
 pub enum Action {
     /// Nothing.
     None,
-    /// End the program.
     Quit,
-    /// Write a value.
     Write(Write),
     /// Handle clicks of the mouse, or leave them to the terminal.
     Mouse(bool),
@@ -90,7 +87,6 @@ fn key(model: &mut Model, key: KeyEvent, screen: Rect, now: Instant) -> Action {
 }
 
 /// Returns the part that receives movement keys. The page of the line contains only its log.
-#[must_use]
 pub fn focus(model: &Model) -> Focus {
     match model.page {
         Page::Points => model.focus,
@@ -125,18 +121,11 @@ fn moving(model: &mut Model, code: KeyCode, screen: Rect, now: Instant) -> Actio
 }
 
 fn operating(model: &mut Model, code: KeyCode, now: Instant) -> Action {
-    let port = match model.tree.selected() {
-        Some(Row::Port(port)) => Some(port.number),
-        _ => None,
-    };
-    match (code, port) {
+    match (code, model.tree.port()) {
         (KeyCode::Left, None) => model.tree.select_port(),
         (KeyCode::Left, Some(port)) => model.tree.set_open(port, false),
         (KeyCode::Right, Some(port)) => model.tree.set_open(port, true),
-        (KeyCode::Char(' ') | KeyCode::Enter, Some(port)) => {
-            let open = model.tree.is_open(port);
-            model.tree.set_open(port, !open);
-        }
+        (KeyCode::Char(' ') | KeyCode::Enter, Some(port)) => model.tree.toggle(port),
         (KeyCode::Char(' ') | KeyCode::Enter, None) => return model.operate(now).into(),
         _ => {}
     }
@@ -231,25 +220,14 @@ fn click(model: &mut Model, parts: &Parts, at: Position, now: Instant) -> Action
         return Action::None;
     }
     model.tree.select(index);
-    let port = match model.tree.selected() {
-        Some(Row::Port(port)) => Some(port.number),
-        _ => None,
-    };
-    match port {
-        Some(port) => {
-            let open = model.tree.is_open(port);
-            model.tree.set_open(port, !open);
-            Action::None
-        }
-        None => {
-            let writable = model.point().is_some_and(|point| point.writable);
-            if writable && parts.values().contains(at) {
-                model.operate(now).into()
-            } else {
-                Action::None
-            }
-        }
+    if let Some(port) = model.tree.port() {
+        model.tree.toggle(port);
     }
+    let writable = model.point().is_some_and(|point| point.writable);
+    if writable && parts.values().contains(at) {
+        return model.operate(now).into();
+    }
+    Action::None
 }
 
 fn slider_mouse(model: &mut Model, mouse: MouseEvent, screen: Rect, now: Instant) -> Action {

@@ -8,53 +8,41 @@ use register_map::Module;
 use register_map::board::MODIO_08;
 use tokio::time::Instant;
 
-use super::fixture::{book, model, show};
+use super::fixture::{model, show};
 use super::input::{Action, event};
 use super::layout::{Parts, Slider};
 use super::messages::Update;
 use super::model::{Focus, Model, Page};
 use crate::failure::Failure;
+use crate::names::book;
 
 const SCREEN: Rect = Rect::new(0, 0, 80, 24);
 
-fn press(model: &mut Model, code: KeyCode, modifiers: KeyModifiers, now: Instant) -> Action {
-    event(
-        model,
-        &Event::Key(KeyEvent::new(code, modifiers)),
-        SCREEN,
-        now,
-    )
+fn press(model: &mut Model, code: KeyCode, modifiers: KeyModifiers) -> Action {
+    let pressed = Event::Key(KeyEvent::new(code, modifiers));
+    event(model, &pressed, SCREEN, Instant::now())
 }
 
-fn key(model: &mut Model, code: KeyCode, now: Instant) -> Action {
-    press(model, code, KeyModifiers::NONE, now)
+fn key(model: &mut Model, code: KeyCode) -> Action {
+    press(model, code, KeyModifiers::NONE)
 }
 
-fn mouse(model: &mut Model, kind: MouseEventKind, at: (u16, u16), now: Instant) -> Action {
-    mouse_on(model, SCREEN, kind, at, now)
-}
-
-fn mouse_on(
-    model: &mut Model,
-    screen: Rect,
-    kind: MouseEventKind,
-    at: (u16, u16),
-    now: Instant,
-) -> Action {
+fn mouse(model: &mut Model, screen: Rect, kind: MouseEventKind, at: (u16, u16)) -> Action {
     let mouse = MouseEvent {
         kind,
         column: at.0,
         row: at.1,
         modifiers: KeyModifiers::NONE,
     };
-    event(model, &Event::Mouse(mouse), screen, now)
+    event(model, &Event::Mouse(mouse), screen, Instant::now())
 }
 
-fn click(model: &mut Model, at: (u16, u16), now: Instant) -> Action {
-    mouse(model, MouseEventKind::Down(MouseButton::Left), at, now)
+fn click(model: &mut Model, at: (u16, u16)) -> Action {
+    mouse(model, SCREEN, MouseEventKind::Down(MouseButton::Left), at)
 }
 
-fn outputs(module: Module, now: Instant) -> Model {
+fn outputs(module: Module) -> Model {
+    let now = Instant::now();
     let mut model = model(module, now);
     show(&mut model, now, &[4000, 4000, 4000, 4000]);
     model
@@ -69,25 +57,24 @@ fn written(action: &Action) -> Option<(&str, &[u16])> {
 
 #[test]
 fn space_and_enter_switch_the_selected_output() {
-    let now = Instant::now();
-    let mut model = outputs(Module::Do4, now);
-    let action = key(&mut model, KeyCode::Char(' '), now);
+    let mut model = outputs(Module::Do4);
+    let action = key(&mut model, KeyCode::Char(' '));
     assert_eq!(written(&action), Some(("p5.1", &[0][..])));
-    key(&mut model, KeyCode::Down, now);
-    let action = key(&mut model, KeyCode::Enter, now);
+    key(&mut model, KeyCode::Down);
+    let action = key(&mut model, KeyCode::Enter);
     assert_eq!(written(&action), Some(("p5.2", &[0][..])));
 }
 
 #[test]
 fn q_and_ctrl_c_quit_and_released_keys_do_nothing() {
     let now = Instant::now();
-    let mut model = outputs(Module::Ao4, now);
-    assert_eq!(key(&mut model, KeyCode::Char('q'), now), Action::Quit);
+    let mut model = outputs(Module::Ao4);
+    assert_eq!(key(&mut model, KeyCode::Char('q')), Action::Quit);
     let ctrl_c = (KeyCode::Char('c'), KeyModifiers::CONTROL);
-    assert_eq!(press(&mut model, ctrl_c.0, ctrl_c.1, now), Action::Quit);
-    key(&mut model, KeyCode::Enter, now);
+    assert_eq!(press(&mut model, ctrl_c.0, ctrl_c.1), Action::Quit);
+    key(&mut model, KeyCode::Enter);
     assert!(model.editor.is_some());
-    assert_eq!(press(&mut model, ctrl_c.0, ctrl_c.1, now), Action::Quit);
+    assert_eq!(press(&mut model, ctrl_c.0, ctrl_c.1), Action::Quit);
     let mut released = KeyEvent::new(KeyCode::Char('q'), KeyModifiers::NONE);
     released.kind = KeyEventKind::Release;
     let action = event(&mut model, &Event::Key(released), SCREEN, now);
@@ -96,74 +83,67 @@ fn q_and_ctrl_c_quit_and_released_keys_do_nothing() {
 
 #[test]
 fn slider_takes_arrows_digits_enter_and_esc() {
-    let now = Instant::now();
-    let mut model = outputs(Module::Ao4, now);
-    key(&mut model, KeyCode::Enter, now);
-    key(&mut model, KeyCode::Right, now);
-    press(&mut model, KeyCode::Right, KeyModifiers::SHIFT, now);
-    key(&mut model, KeyCode::PageUp, now);
-    key(&mut model, KeyCode::Down, now);
-    let action = key(&mut model, KeyCode::Enter, now);
+    let mut model = outputs(Module::Ao4);
+    key(&mut model, KeyCode::Enter);
+    key(&mut model, KeyCode::Right);
+    press(&mut model, KeyCode::Right, KeyModifiers::SHIFT);
+    key(&mut model, KeyCode::PageUp);
+    key(&mut model, KeyCode::Down);
+    let action = key(&mut model, KeyCode::Enter);
     assert_eq!(written(&action), Some(("p5.1", &[7359][..])));
-    key(&mut model, KeyCode::Down, now);
-    key(&mut model, KeyCode::Enter, now);
+    key(&mut model, KeyCode::Down);
+    key(&mut model, KeyCode::Enter);
     for digit in "12q500".chars() {
-        assert_eq!(key(&mut model, KeyCode::Char(digit), now), Action::None);
+        assert_eq!(key(&mut model, KeyCode::Char(digit)), Action::None);
     }
-    let action = key(&mut model, KeyCode::Enter, now);
+    let action = key(&mut model, KeyCode::Enter);
     assert_eq!(written(&action), Some(("p5.2", &[12_500][..])));
-    key(&mut model, KeyCode::Down, now);
-    key(&mut model, KeyCode::Enter, now);
-    key(&mut model, KeyCode::Esc, now);
+    key(&mut model, KeyCode::Down);
+    key(&mut model, KeyCode::Enter);
+    key(&mut model, KeyCode::Esc);
     assert!(model.editor.is_none());
 }
 
 #[test]
 fn click_on_a_value_operates_and_elsewhere_only_selects() {
-    let now = Instant::now();
-    let mut model = outputs(Module::Do4, now);
+    let mut model = outputs(Module::Do4);
     model.tree.scrolled(10);
-    assert_eq!(click(&mut model, (3, 6), now), Action::None);
+    assert_eq!(click(&mut model, (3, 6)), Action::None);
     assert_eq!(model.point().unwrap().name, "p5.3");
-    let action = click(&mut model, (30, 6), now);
+    let action = click(&mut model, (30, 6));
     assert_eq!(written(&action), Some(("p5.3", &[0][..])));
-    assert_eq!(click(&mut model, (3, 3), now), Action::None);
+    assert_eq!(click(&mut model, (3, 3)), Action::None);
     assert!(!model.tree.is_open(5));
     assert_eq!(
-        click(&mut model, (30, 12), now),
+        click(&mut model, (30, 12)),
         Action::None,
         "below the last row"
     );
     model.mouse = false;
-    assert_eq!(click(&mut model, (30, 3), now), Action::None);
+    assert_eq!(click(&mut model, (30, 3)), Action::None);
     assert!(!model.tree.is_open(5), "the mouse is disabled");
 }
 
 #[test]
 fn slider_is_set_by_the_mouse() {
-    let now = Instant::now();
-    let mut model = outputs(Module::Ao4, now);
-    key(&mut model, KeyCode::Enter, now);
+    let mut model = outputs(Module::Ao4);
+    key(&mut model, KeyCode::Enter);
     let slider = Slider::new(SCREEN);
     let end = (slider.bar.right() - 1, slider.bar.y);
-    mouse(
-        &mut model,
-        MouseEventKind::Drag(MouseButton::Left),
-        end,
-        now,
-    );
-    let action = click(&mut model, (slider.send.x + 1, slider.send.y), now);
+    let drag = MouseEventKind::Drag(MouseButton::Left);
+    mouse(&mut model, SCREEN, drag, end);
+    let action = click(&mut model, (slider.send.x + 1, slider.send.y));
     assert_eq!(written(&action), Some(("p5.1", &[20_000][..])));
-    key(&mut model, KeyCode::Down, now);
-    key(&mut model, KeyCode::Enter, now);
-    click(&mut model, (slider.leave.x, slider.leave.y), now);
+    key(&mut model, KeyCode::Down);
+    key(&mut model, KeyCode::Enter);
+    click(&mut model, (slider.leave.x, slider.leave.y));
     assert!(model.editor.is_none());
 }
 
 #[test]
 fn failed_write_has_keys_and_buttons() {
     let now = Instant::now();
-    let mut model = outputs(Module::Do4, now);
+    let mut model = outputs(Module::Do4);
     let fail = |model: &mut Model| {
         model.pending.clear();
         show(model, now, &[0; 4]);
@@ -174,53 +154,48 @@ fn failed_write_has_keys_and_buttons() {
         model.update(Update::Wrote(write, Err(refused)), now);
     };
     fail(&mut model);
-    let action = key(&mut model, KeyCode::Char('r'), now);
+    let action = key(&mut model, KeyCode::Char('r'));
     assert_eq!(written(&action), Some(("p5.1", &[1][..])));
     fail(&mut model);
-    key(&mut model, KeyCode::Esc, now);
-    assert_eq!(key(&mut model, KeyCode::Char('r'), now), Action::None);
+    key(&mut model, KeyCode::Esc);
+    assert_eq!(key(&mut model, KeyCode::Char('r')), Action::None);
     fail(&mut model);
     let [again, drop] = Parts::new(SCREEN, Page::Points).buttons();
-    let action = click(&mut model, (again.x, again.y), now);
+    let action = click(&mut model, (again.x, again.y));
     assert_eq!(written(&action), Some(("p5.1", &[1][..])));
     fail(&mut model);
-    click(&mut model, (drop.x, drop.y), now);
+    click(&mut model, (drop.x, drop.y));
     assert!(model.failed.is_empty());
 }
 
 #[test]
 fn help_closes_with_any_key_and_blocks_other_actions() {
-    let now = Instant::now();
-    let mut model = outputs(Module::Do4, now);
-    key(&mut model, KeyCode::Char('?'), now);
+    let mut model = outputs(Module::Do4);
+    key(&mut model, KeyCode::Char('?'));
     assert!(model.help);
-    assert_eq!(key(&mut model, KeyCode::Char(' '), now), Action::None);
+    assert_eq!(key(&mut model, KeyCode::Char(' ')), Action::None);
     assert!(!model.help && model.pending.is_empty());
 }
 
 #[test]
 fn pages_focus_and_log_follow_their_keys() {
-    let now = Instant::now();
-    let mut model = outputs(Module::Do4, now);
-    key(&mut model, KeyCode::Tab, now);
+    let mut model = outputs(Module::Do4);
+    key(&mut model, KeyCode::Tab);
     assert_eq!(model.focus, Focus::Frames);
-    key(&mut model, KeyCode::Char('2'), now);
-    key(&mut model, KeyCode::Char('p'), now);
-    key(&mut model, KeyCode::Char('x'), now);
+    key(&mut model, KeyCode::Char('2'));
+    key(&mut model, KeyCode::Char('p'));
+    key(&mut model, KeyCode::Char('x'));
     assert!(model.page == Page::Line && model.frames.paused && model.frames.hex);
-    click(&mut model, (3, 1), now);
+    click(&mut model, (3, 1));
     assert_eq!(model.page, Page::Points);
-    assert_eq!(
-        key(&mut model, KeyCode::Char('m'), now),
-        Action::Mouse(false)
-    );
+    assert_eq!(key(&mut model, KeyCode::Char('m')), Action::Mouse(false));
 }
 
 #[test]
 fn any_event_on_any_screen_is_handled() {
     let now = Instant::now();
-    let mut model = outputs(Module::Ao4, now);
-    let eight = Box::new(book(&MODIO_08, Module::Do4, 0, 0));
+    let mut model = outputs(Module::Ao4);
+    let eight = Box::new(book(&MODIO_08, Module::Do4, (0, 0)));
     model.update(Update::Learned(eight), now);
     let codes = [
         KeyCode::Home,
@@ -245,7 +220,7 @@ fn any_event_on_any_screen_is_handled() {
                 MouseEventKind::Down(MouseButton::Left),
                 MouseEventKind::ScrollUp,
             ] {
-                mouse_on(&mut model, screen, kind, at, now);
+                mouse(&mut model, screen, kind, at);
             }
         }
     }

@@ -1,12 +1,12 @@
 //! Positions of the parts of the display, for drawing and for clicks of the mouse.
 
-use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::layout::Constraint::{Fill, Length};
+use ratatui::layout::{Layout, Rect};
 
 use super::model::Page;
 
 /// Smallest width and height that the display fits in.
 pub const LEAST: (u16, u16) = (60, 16);
-/// Width of the tree.
 const TREE: u16 = 50;
 /// Smallest height of the chart when counters share its column.
 const CHART: u16 = 12;
@@ -36,16 +36,9 @@ pub struct Parts {
 
 impl Parts {
     /// Divides the screen.
-    #[must_use]
     pub fn new(screen: Rect, page: Page) -> Self {
-        let [head, tabs, main, message, keys] = Layout::vertical([
-            Constraint::Length(1),
-            Constraint::Length(1),
-            Constraint::Fill(1),
-            Constraint::Length(2),
-            Constraint::Length(1),
-        ])
-        .areas(screen);
+        let rows = [Length(1), Length(1), Fill(1), Length(2), Length(1)];
+        let [head, tabs, main, message, keys] = Layout::vertical(rows).areas(screen);
         let parts = Self {
             head,
             tabs,
@@ -61,21 +54,15 @@ impl Parts {
 
     fn points(self, main: Rect) -> Self {
         let log = (main.height / 3).max(4);
-        let [upper, frames] =
-            Layout::vertical([Constraint::Fill(1), Constraint::Length(log)]).areas(main);
-        let [tree, _, right] = Layout::horizontal([
-            Constraint::Length(TREE),
-            Constraint::Length(1),
-            Constraint::Fill(1),
-        ])
-        .areas(upper);
+        let [upper, frames] = Layout::vertical([Fill(1), Length(log)]).areas(main);
+        let columns = [Length(TREE), Length(1), Fill(1)];
+        let [tree, _, right] = Layout::horizontal(columns).areas(upper);
         let below = if right.height >= CHART + COUNTERS && right.width >= 2 * 28 {
             COUNTERS
         } else {
             0
         };
-        let [chart, counters] =
-            Layout::vertical([Constraint::Fill(1), Constraint::Length(below)]).areas(right);
+        let [chart, counters] = Layout::vertical([Fill(1), Length(below)]).areas(right);
         Self {
             tree,
             chart,
@@ -87,8 +74,7 @@ impl Parts {
 
     fn line(self, main: Rect) -> Self {
         let height = COUNTERS.min(main.height.saturating_sub(4));
-        let [counters, frames] =
-            Layout::vertical([Constraint::Length(height), Constraint::Fill(1)]).areas(main);
+        let [counters, frames] = Layout::vertical([Length(height), Fill(1)]).areas(main);
         Self {
             counters,
             frames,
@@ -97,7 +83,6 @@ impl Parts {
     }
 
     /// Returns the rows below the title of a part.
-    #[must_use]
     pub const fn inside(part: Rect) -> Rect {
         Rect {
             y: part.y.saturating_add(1),
@@ -107,16 +92,8 @@ impl Parts {
     }
 
     /// Returns the positions of the page names.
-    #[must_use]
     pub fn pages(&self) -> [(Page, &'static str, Rect); 2] {
-        let at = |x: u16, width| {
-            let cell = Rect {
-                x: self.tabs.x.saturating_add(x),
-                width,
-                ..self.tabs
-            };
-            cell.intersection(self.tabs)
-        };
+        let at = |x, width| within(self.tabs, x, 0, width, 1);
         [
             (Page::Points, " 1 Points ", at(0, 10)),
             (Page::Line, " 2 Line ", at(11, 8)),
@@ -124,34 +101,15 @@ impl Parts {
     }
 
     /// Returns the area of the values in the tree. A click there operates an output.
-    #[must_use]
     pub fn values(&self) -> Rect {
         let inside = Self::inside(self.tree);
-        Rect {
-            x: inside.x.saturating_add(VALUE_AT),
-            width: VALUE,
-            ..inside
-        }
-        .intersection(inside)
+        within(inside, VALUE_AT, 0, VALUE, inside.height)
     }
 
     /// Returns the buttons of a failed write: to repeat it, and to drop it.
-    #[must_use]
     pub fn buttons(&self) -> [Rect; 2] {
-        let line = Rect {
-            y: self.message.y.saturating_add(1),
-            height: 1,
-            ..self.message
-        }
-        .intersection(self.message);
-        [(0, AGAIN.len()), (AGAIN.len() + 1, DROP.len())].map(|(x, width)| {
-            let button = Rect {
-                x: line.x.saturating_add(x as u16),
-                width: width as u16,
-                ..line
-            };
-            button.intersection(line)
-        })
+        let button = |x: usize, text: &str| within(self.message, x as u16, 1, text.len() as u16, 1);
+        [button(0, AGAIN), button(AGAIN.len() + 1, DROP)]
     }
 }
 
@@ -184,18 +142,9 @@ pub const LEAVE: &str = "[Esc: leave]";
 
 impl Slider {
     /// Places the slider in the middle of the screen.
-    #[must_use]
     pub fn new(screen: Rect) -> Self {
         let window = centred(screen, 58, 9);
-        let line = |y: u16, x: u16, width: usize| {
-            let line = Rect {
-                x: window.x.saturating_add(x),
-                y: window.y.saturating_add(y),
-                width: width as u16,
-                height: 1,
-            };
-            line.intersection(window)
-        };
+        let line = |y, x, width: usize| within(window, x, y, width as u16, 1);
         let wide = usize::from(window.width.saturating_sub(4));
         Self {
             window,
@@ -206,8 +155,13 @@ impl Slider {
     }
 }
 
+/// Returns a part of an area, at a distance from its upper left corner. What lies outside of the area is left out.
+pub fn within(area: Rect, x: u16, y: u16, width: u16, height: u16) -> Rect {
+    let (x, y) = (area.x.saturating_add(x), area.y.saturating_add(y));
+    Rect::new(x, y, width, height).intersection(area)
+}
+
 /// Returns a window in the middle of the screen.
-#[must_use]
 pub fn centred(screen: Rect, width: u16, height: u16) -> Rect {
     let (width, height) = (width.min(screen.width), height.min(screen.height));
     Rect {
@@ -224,16 +178,9 @@ mod tests {
 
     #[test]
     fn parts_are_inside_a_screen_of_any_size() {
-        for (width, height) in [
-            (0, 0),
-            (1, 1),
-            (60, 16),
-            (80, 24),
-            (120, 40),
-            (300, 5),
-            (3, 200),
-        ] {
-            let screen = Rect::new(0, 0, width, height);
+        for size in ["0x0", "1x1", "60x16", "80x24", "120x40", "300x5", "3x200"] {
+            let (width, height) = size.split_once('x').unwrap();
+            let screen = Rect::new(0, 0, width.parse().unwrap(), height.parse().unwrap());
             for page in [Page::Points, Page::Line] {
                 let parts = Parts::new(screen, page);
                 let buttons = parts.buttons();
@@ -253,10 +200,8 @@ mod tests {
                     slider.leave,
                 ];
                 for part in all {
-                    assert!(
-                        part.is_empty() || screen.intersection(part) == part,
-                        "{part:?}"
-                    );
+                    let outside = screen.intersection(part) != part;
+                    assert!(part.is_empty() || !outside, "{part:?}");
                 }
             }
         }

@@ -24,7 +24,6 @@ pub struct Link {
 /// State of the connection.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum State {
-    /// The unit answers.
     Answers,
     /// Nothing is received.
     NoAnswer(Duration),
@@ -38,7 +37,6 @@ pub enum State {
 
 impl Link {
     /// Returns a link to a unit that has just answered.
-    #[must_use]
     pub fn new(now: Instant, every: Duration) -> Self {
         Self {
             answered: now,
@@ -61,13 +59,11 @@ impl Link {
     }
 
     /// Returns the failure of the last round.
-    #[must_use]
     pub const fn trouble(&self) -> Option<&Failure> {
         self.trouble.as_ref()
     }
 
     /// Returns the state of the connection.
-    #[must_use]
     pub fn state(&self, now: Instant) -> State {
         let since = now.saturating_duration_since(self.answered);
         match &self.trouble {
@@ -81,21 +77,18 @@ impl Link {
 
     /// Returns whether a value that was read at this time is fresh. `extra` is an additional time for values that
     /// are read less often.
-    #[must_use]
     pub fn is_fresh(&self, at: Instant, now: Instant, extra: Duration) -> bool {
         let age = now.saturating_duration_since(at);
         self.trouble.is_none() && age <= self.limit + extra
     }
 
     /// Returns the longest pause between two values of a line in the chart.
-    #[must_use]
     pub const fn limit(&self) -> Duration {
         self.limit
     }
 }
 
 /// Returns a duration for people: `12 s`, `3 min`, `2 h`.
-#[must_use]
 pub fn ago(duration: Duration) -> String {
     match duration.as_secs() {
         seconds @ 0..=119 => format!("{seconds} s"),

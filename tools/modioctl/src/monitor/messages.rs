@@ -41,7 +41,6 @@ pub struct Polled {
 pub enum Update {
     /// The polling task has learned the names of the unit, for the first time or again.
     Learned(Box<Book>),
-    /// A round of polling is complete.
     Polled(Polled),
     /// A round of polling failed.
     Lost(Failure),

@@ -48,11 +48,8 @@ use crate::trace;
 /// Interval at which the display is drawn. The ages of values increase without messages.
 const FRAME: Duration = Duration::from_millis(100);
 
-/// Shows the unit until the user quits.
-///
-/// # Errors
-///
-/// When there is no terminal, or no modio at the start. A unit that is lost later is shown as lost.
+/// Shows the unit until the user quits. Fails without a terminal, or without a modio at the start. A unit that is lost
+/// later is shown as lost.
 pub async fn run(
     endpoint: Endpoint,
     options: &Monitor,

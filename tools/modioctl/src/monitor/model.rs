@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
+use modio_description::Description;
 use tokio::time::Instant;
 
 use super::editor::Editor;
@@ -10,7 +11,7 @@ use super::frames::Frames;
 use super::history::History;
 use super::link::Link;
 use super::messages::{Polled, Update, Write};
-use super::plan::{is_analog, title};
+use super::plan::is_analog;
 use super::tree::{Row, Tree};
 use crate::failure::Failure;
 use crate::names::{Book, Item};
@@ -34,10 +35,8 @@ pub enum Page {
 /// Part of a page that receives movement keys.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Focus {
-    /// The tree.
     #[default]
     Tree,
-    /// The log.
     Frames,
 }
 
@@ -109,7 +108,6 @@ pub struct Model {
 
 impl Model {
     /// Returns a display of a unit before the first message of the polling task.
-    #[must_use]
     pub fn new(place: String, unit: u8, every: Duration, now: Instant) -> Self {
         Self {
             place,
@@ -188,6 +186,7 @@ impl Model {
             let text = format!("the unit has other modules or settings than before{dropped}");
             self.say(&text, now);
         }
+        let title = |unit: &Description| format!("{} {}", unit.board, unit.firmware);
         self.title = book.description().map(title).unwrap_or_default();
         self.tree.set(book.ports());
         self.book = book;
@@ -255,14 +254,12 @@ impl Model {
     }
 
     /// Returns the message to show, if it is not too old.
-    #[must_use]
     pub fn notice(&self, now: Instant) -> Option<&str> {
         let (text, at) = self.notice.as_ref()?;
         (now.saturating_duration_since(*at) < NOTICE).then_some(text.as_str())
     }
 
     /// Returns the conditions that the unit reports; `None` when there are none, or when they are not known.
-    #[must_use]
     pub fn status(&self, now: Instant) -> Option<String> {
         let (value, _) = self.value("status", now).filter(|(_, fresh)| *fresh)?;
         let item = self.book.item("status")?;
@@ -271,39 +268,33 @@ impl Model {
     }
 
     /// Returns the words of an item, and whether they are fresh.
-    #[must_use]
     pub fn value(&self, name: &str, now: Instant) -> Option<(&Stamped, bool)> {
         let value = self.values.get(name)?;
         Some((value, self.link.is_fresh(value.at, now, Duration::ZERO)))
     }
 
     /// Returns the words of a counter, and whether they are fresh.
-    #[must_use]
     pub fn counter(&self, name: &str, now: Instant) -> Option<(&Stamped, bool)> {
         let value = self.values.get(name)?;
         Some((value, self.link.is_fresh(value.at, now, SELDOM)))
     }
 
     /// Returns the history of a point.
-    #[must_use]
     pub fn history(&self, name: &str) -> Option<&History> {
         self.histories.get(name)
     }
 
     /// Returns the reason why the unit refuses the points of a port.
-    #[must_use]
     pub fn refusal(&self, port: u8) -> Option<&str> {
         self.refused.get(&port).map(String::as_str)
     }
 
     /// Returns whether a port waits for a restart, so that its analog values have no known meaning.
-    #[must_use]
     pub fn waits(&self, port: u8) -> bool {
         self.waiting.contains(&port)
     }
 
     /// Returns the point that is selected.
-    #[must_use]
     pub fn point(&self) -> Option<&Item> {
         match self.tree.selected()? {
             Row::Point(item) => Some(item),

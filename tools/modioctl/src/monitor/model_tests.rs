@@ -6,11 +6,12 @@ use register_map::Module;
 use register_map::board::MODIO_02;
 use tokio::time::Instant;
 
-use super::fixture::{book, model, polled, show};
+use super::fixture::{model, polled, show};
 use super::link::State;
 use super::messages::{Update, Write};
 use super::model::Model;
 use crate::failure::Failure;
+use crate::names::book;
 
 fn silent() -> Failure {
     Failure::NoAnswer("unit 1 does not answer".to_owned())
@@ -92,7 +93,7 @@ fn failed_write_is_offered_again_and_repeated_only_when_ordered() {
     assert!(model.failed[0].text.contains("may have executed it"));
     assert_eq!(is_fresh(&model, "p5.2", now), Some(false));
     let later = after(now, 60_000);
-    let back = Box::new(book(&MODIO_02, Module::Do4, 1, 1));
+    let back = Box::new(book(&MODIO_02, Module::Do4, (1, 1)));
     model.update(Update::Learned(back), later);
     show(&mut model, later, &[0, 1, 0, 0]);
     let again = model.retry(later).unwrap();
@@ -127,7 +128,7 @@ fn unit_with_other_modules_loses_values_writes_and_slider() {
     };
     model.update(Update::Wrote(write, Err(silent())), now);
     // The same module, but with voltages: 4000 would now be shown as 4000 mV.
-    let volts = Box::new(book(&MODIO_02, Module::Ao4, 0, 1));
+    let volts = Box::new(book(&MODIO_02, Module::Ao4, (0, 1)));
     model.update(Update::Learned(volts), now);
     assert!(model.editor.is_none() && model.failed.is_empty());
     assert!(model.value("p5.1", now).is_none() && model.history("p5.1").is_none());
@@ -144,7 +145,7 @@ fn same_unit_that_returns_keeps_its_values_as_old() {
         model.link.state(later),
         State::NoAnswer(Duration::from_secs(12))
     );
-    let back = Box::new(book(&MODIO_02, Module::Do4, 1, 1));
+    let back = Box::new(book(&MODIO_02, Module::Do4, (1, 1)));
     model.update(Update::Learned(back), later);
     assert_eq!(is_fresh(&model, "p5.2", later), Some(false));
     show(&mut model, later, &[0; 4]);

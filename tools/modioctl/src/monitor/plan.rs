@@ -2,8 +2,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use modio_description::Description;
-
 use crate::names::{Book, Item, Meaning, PortItems};
 
 /// Values by the name of their item.
@@ -38,7 +36,6 @@ pub struct Plan {
 
 impl Plan {
     /// Returns the items to read of the unit with these names.
-    #[must_use]
     pub fn new(book: &Book) -> Self {
         let ports = book.ports();
         let found = |name: &str| book.item(name).cloned();
@@ -70,7 +67,6 @@ impl Plan {
 
     /// Returns whether the unit still has the modules, ranges and scales for which the plan was made. These words
     /// were read after the points, so a change between the two reads is detected.
-    #[must_use]
     pub fn holds(&self, words: &Words) -> bool {
         self.ports.iter().all(|port| {
             let in_force = words.get(&format!("p{}.module_in_force", port.number));
@@ -85,7 +81,6 @@ impl Plan {
     }
 
     /// Returns the settings that determine the meaning of a point.
-    #[must_use]
     pub fn settings_of(&self, point: &Item) -> Vec<Item> {
         let names = ["range", "scale"].map(|setting| format!("{}.{setting}", point.name));
         let settings = self.settings.iter();
@@ -95,7 +90,6 @@ impl Plan {
 
     /// Returns whether RANGE and SCALE of an analog point are those for which its meaning is known. The meaning of
     /// other points never changes.
-    #[must_use]
     pub fn reads_alike(point: &Item, words: &Words) -> bool {
         let setting = |setting: &str| {
             let words = words.get(&format!("{}.{setting}", point.name));
@@ -111,7 +105,6 @@ impl Plan {
 
     /// Returns the ports whose MODULE differs from the module in force. RANGE and SCALE of such a port belong to
     /// the module after the next restart, and do not apply to the present one.
-    #[must_use]
     pub fn waiting_for_restart(&self, words: &Words) -> BTreeSet<u8> {
         let waiting = self.ports.iter().filter(|port| self.unsettled(port, words));
         waiting.map(|port| port.number).collect()
@@ -123,14 +116,7 @@ impl Plan {
     }
 }
 
-/// Returns the name and the firmware of a unit, for people.
-#[must_use]
-pub fn title(description: &Description) -> String {
-    format!("{} {}", description.board, description.firmware)
-}
-
 /// Returns whether an item is an analog point.
-#[must_use]
 pub const fn is_analog(item: &Item) -> bool {
     matches!(item.meaning, Meaning::Analog(_))
 }

@@ -7,6 +7,7 @@ use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender};
 use tokio::time::{Instant, sleep_until};
 
 use super::messages::{Polled, Update, Write};
+use super::model::SELDOM;
 use super::plan::{Plan, Words, is_analog};
 use crate::bus::{Endpoint, Observer};
 use crate::device::{Device, fetch};
@@ -22,8 +23,6 @@ const AGAIN: Duration = Duration::from_secs(1);
 /// Time without an answer after which a connection is opened again. A gateway that has lost its supply never closes
 /// it.
 const STUCK: Duration = Duration::from_secs(5);
-/// Interval at which counters are read.
-const COUNTERS: Duration = Duration::from_secs(1);
 /// Shortest pause between two rounds.
 const PAUSE: Duration = Duration::from_millis(5);
 
@@ -47,9 +46,7 @@ pub struct Poller {
     answered: Instant,
 }
 
-/// Result of a round.
 enum Round {
-    /// Its values are valid.
     Complete(Box<Polled>),
     /// A write is waiting, which may change values that were read before it.
     Interrupted,
@@ -59,7 +56,6 @@ enum Round {
 
 impl Poller {
     /// Creates the task for an open device without knowledge about the unit.
-    #[must_use]
     pub fn new(
         device: Device,
         every: Duration,
@@ -164,15 +160,15 @@ impl Poller {
             return Ok(Round::Changed);
         }
         self.waiting.extend(plan.waiting_for_restart(&words));
-        for port in &plan.ports {
-            if self.waiting.contains(&port.number) {
-                for point in port.points.iter().filter(|point| is_analog(point)) {
-                    words.remove(&point.name);
-                }
+        let ports = plan.ports.iter();
+        let waiting = ports.filter(|port| self.waiting.contains(&port.number));
+        for point in waiting.flat_map(|port| &port.points) {
+            if is_analog(point) {
+                words.remove(&point.name);
             }
         }
         let counted = self.counted.map(|counted| counted.elapsed());
-        if counted.is_none_or(|age| age >= COUNTERS)
+        if counted.is_none_or(|age| age >= SELDOM)
             && self.writes.is_empty()
             && let Some(device) = &mut self.device
         {
@@ -270,7 +266,6 @@ impl Poller {
     }
 }
 
-/// Reads items into `words`.
 async fn read(device: &mut Device, items: &[Item], words: &mut Words) -> Result<(), Failure> {
     let values = device.read_items(items).await?;
     let names = items.iter().map(|item| item.name.clone());

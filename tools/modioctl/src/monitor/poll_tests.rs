@@ -9,12 +9,13 @@ use tokio::net::TcpListener;
 use tokio::sync::mpsc::unbounded_channel;
 use tokio::time::Instant;
 
-use super::fixture::{EVERY, book};
+use super::fixture::EVERY;
 use super::messages::{Update, Write};
 use super::poll::Poller;
 use crate::bus::adu::Framing;
 use crate::bus::{Endpoint, Place};
 use crate::device::Device;
+use crate::names::book;
 
 /// Orders a write that was requested this long ago from a unit that does not answer. Returns the failure and the
 /// bytes that the unit received.
@@ -25,21 +26,17 @@ fn order(age: Duration) -> (String, Vec<u8>) {
         .unwrap();
     runtime.block_on(async {
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let place = Place::Tcp(listener.local_addr().unwrap().to_string());
         let endpoint = Endpoint {
-            place: Place::Tcp(listener.local_addr().unwrap().to_string()),
-            baud: 115_200,
-            format: modbus_line::Format::default(),
-            framing: Framing::Rtu,
-            unit: 1,
             timeout: Duration::from_millis(20),
             retries: 0,
-            timeout_given: true,
+            ..Endpoint::new(place, Framing::Rtu)
         };
         let device = Device::open(endpoint, None).await.unwrap();
         let (mut stream, _) = listener.accept().await.unwrap();
         let (updates, mut news) = unbounded_channel();
         let (orders, writes) = unbounded_channel();
-        let output = book(&MODIO_02, Module::Do4, 0, 0).find("p5.1").unwrap();
+        let output = book(&MODIO_02, Module::Do4, (0, 0)).find("p5.1").unwrap();
         let write = Write {
             item: output,
             words: vec![1],

@@ -28,10 +28,6 @@ pub struct Screen {
 
 impl Screen {
     /// Prepares the terminal and reads its events.
-    ///
-    /// # Errors
-    ///
-    /// When the terminal cannot be used; the error says why.
     pub fn open() -> Result<(Self, UnboundedReceiver<io::Result<Event>>), Failure> {
         let terminal = ratatui::try_init().map_err(|error| {
             ratatui::restore();
@@ -69,7 +65,6 @@ impl Screen {
     }
 
     /// Returns whether a part of the program has panicked, so that nothing may be drawn any more.
-    #[must_use]
     pub fn has_panicked(&self) -> bool {
         self.panicked.load(Ordering::Relaxed)
     }

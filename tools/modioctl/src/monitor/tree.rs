@@ -7,15 +7,12 @@ use crate::names::{Item, PortItems};
 /// A row of the tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Row<'a> {
-    /// A port.
     Port(&'a PortItems),
-    /// A point.
     Point(&'a Item),
 }
 
 impl Row<'_> {
     /// Returns the name that distinguishes the row: `p5`, `p5.1`.
-    #[must_use]
     pub fn name(&self) -> String {
         match self {
             Row::Port(port) => format!("p{}", port.number),
@@ -45,13 +42,11 @@ impl Tree {
     }
 
     /// Returns the ports.
-    #[must_use]
     pub fn ports(&self) -> &[PortItems] {
         &self.ports
     }
 
     /// Returns the rows, without the points of ports that are closed.
-    #[must_use]
     pub fn rows(&self) -> Vec<Row<'_>> {
         let rows = self.ports.iter().flat_map(|port| {
             let open = self.is_open(port.number);
@@ -62,7 +57,6 @@ impl Tree {
     }
 
     /// Returns whether the points of a port are shown.
-    #[must_use]
     pub fn is_open(&self, port: u8) -> bool {
         !self.closed.contains(&port)
     }
@@ -76,14 +70,25 @@ impl Tree {
         }
     }
 
+    /// Opens a port that is closed, or closes it.
+    pub fn toggle(&mut self, port: u8) {
+        self.set_open(port, !self.is_open(port));
+    }
+
+    /// Returns the port that is selected; `None` for a point.
+    pub fn port(&self) -> Option<u8> {
+        match self.selected()? {
+            Row::Port(port) => Some(port.number),
+            Row::Point(_) => None,
+        }
+    }
+
     /// Returns the row that is selected.
-    #[must_use]
     pub fn selected(&self) -> Option<Row<'_>> {
         self.rows().get(self.selected).copied()
     }
 
     /// Returns the index of the selected row.
-    #[must_use]
     pub const fn index(&self) -> usize {
         self.selected
     }
@@ -119,7 +124,6 @@ impl Tree {
     }
 
     /// Returns the index of the first row in the window, as it was drawn.
-    #[must_use]
     pub const fn offset(&self) -> usize {
         self.offset
     }
@@ -127,17 +131,15 @@ impl Tree {
 
 #[cfg(test)]
 mod tests {
-    use modio_description::describe;
     use register_map::Module;
     use register_map::board::MODIO_08;
 
     use super::*;
-    use crate::names::Book;
+    use crate::names::book;
 
     fn tree(module: Module) -> Tree {
         let mut tree = Tree::default();
-        let book = Book::new(describe(&MODIO_08, "0.1.0", |_| module), vec![(0, 0); 32]);
-        tree.set(book.ports());
+        tree.set(book(&MODIO_08, module, (0, 0)).ports());
         tree
     }
 
@@ -182,10 +184,9 @@ mod tests {
         let mut tree = tree(Module::Do4);
         tree.select(7);
         assert_eq!(selected(&tree), "p2.2");
-        let book = |module| Book::new(describe(&MODIO_08, "0.1.0", |_| module), vec![(0, 0); 32]);
-        tree.set(book(Module::Ai4).ports());
+        tree.set(book(&MODIO_08, Module::Ai4, (0, 0)).ports());
         assert_eq!(selected(&tree), "p2.2");
-        tree.set(book(Module::None).ports());
+        tree.set(book(&MODIO_08, Module::None, (0, 0)).ports());
         assert_eq!(selected(&tree), "p1");
         tree.set(Vec::new());
         assert_eq!(tree.selected(), None);

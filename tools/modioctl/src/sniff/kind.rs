@@ -17,7 +17,6 @@ pub const SHORTEST: usize = 4;
 /// The length of a frame that starts with certain bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Length {
-    /// The frame has this length.
     Known(usize),
     /// More bytes are needed to know the length.
     Later,

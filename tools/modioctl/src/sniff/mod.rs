@@ -31,11 +31,8 @@ pub struct Piece {
 pub enum Kind {
     /// A frame with a correct check.
     Frame {
-        /// The direction of the frame.
         direction: Direction,
-        /// The unit address in the frame.
         unit: u8,
-        /// The PDU.
         pdu: Vec<u8>,
         /// For a response: the request that it answers, if the listener received that request.
         request: Option<Request>,
@@ -57,7 +54,6 @@ pub struct Request {
 
 impl Piece {
     /// Returns the time from the end of the request to the beginning of its response.
-    #[must_use]
     pub fn turnaround(&self) -> Option<Duration> {
         match &self.kind {
             Kind::Frame {

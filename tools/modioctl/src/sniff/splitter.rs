@@ -8,14 +8,11 @@ use super::{Kind, Piece, Request};
 use crate::bus::Direction;
 use crate::bus::adu::{ASCII_MOST, Framing, RTU_MOST};
 
-/// Content at the front of the buffer.
 #[derive(Debug, PartialEq, Eq)]
 enum Front {
-    /// A frame of this many bytes.
     Frame(usize),
     /// This many bytes that belong to no frame.
     Garbled(usize),
-    /// More bytes are needed.
     Unknown,
 }
 
@@ -39,7 +36,6 @@ pub struct Splitter {
 impl Splitter {
     /// Returns a splitter for a line. `character` is the time of one character, zero when the times of the bytes within
     /// a chunk are unknown. A response can start up to `patience` after its request.
-    #[must_use]
     pub fn new(framing: Framing, character: Duration, patience: Duration) -> Self {
         Self {
             framing,
@@ -54,7 +50,6 @@ impl Splitter {
     }
 
     /// Returns whether no bytes wait for the rest of their frame.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.bytes.is_empty() && self.garbled.is_none()
     }

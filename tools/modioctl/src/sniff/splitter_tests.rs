@@ -20,7 +20,6 @@ fn told(pieces: &[Piece]) -> Vec<(Option<Direction>, Vec<u8>)> {
     each.collect()
 }
 
-/// A request and its response.
 type Exchange = (Vec<u8>, Vec<u8>);
 
 fn exchanges() -> Vec<Exchange> {

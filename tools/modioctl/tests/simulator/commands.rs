@@ -1,11 +1,10 @@
 //! Tests of every command, except `monitor` and `sniff`, which have their own files. Reads, writes and scans run on each
 //! kind of line, the other commands on one of them.
 
-use crate::program::{At, modioctl};
+use crate::program::{At, has, modioctl};
 use crate::unit::Unit;
 use crate::{bus, gateway};
 
-/// Returns a unit on each kind of line.
 fn lines(unit: &Unit) -> [At; 3] {
     [
         At::port(unit.pty.display()),
@@ -33,10 +32,7 @@ fn a_slot_is_commissioned_with_one_command_and_its_points_are_read() {
     let text = at.run("reboot").fine();
     assert!(text.starts_with("restarted"), "{text}");
     let text = at.run("read p5.1.scale p5.2.scale").fine();
-    assert!(
-        text.contains("engineering units") && text.contains("raw 12-bit"),
-        "{text}"
-    );
+    has(&text, &["engineering units", "raw 12-bit"]);
 }
 
 #[test]
@@ -113,18 +109,12 @@ fn settings_are_exported_and_imported_and_a_wrong_file_changes_nothing() {
         .replace("p5.3.safe = 0 ", "p5.3.safe = 1000 ");
     std::fs::write(&file, changed.replace("p5.1.beta = 3950", "p5.1.beta = 10")).unwrap();
     let wrong = at.run(&format!("config import {path}")).failed(2);
-    assert!(
-        wrong.contains("p5.1.beta") && wrong.contains("2000 to 5000 K"),
-        "{wrong}"
-    );
+    has(&wrong, &["p5.1.beta", "2000 to 5000 K"]);
     assert_eq!(at.run("read COMM_TIMEOUT").fine(), "COMM_TIMEOUT  0.0 s\n");
 
     std::fs::write(&file, changed).unwrap();
     let differs = at.run(&format!("config diff {path}")).fine();
-    assert!(
-        differs.contains("COMM_TIMEOUT") && differs.contains("p5.3.safe"),
-        "{differs}"
-    );
+    has(&differs, &["COMM_TIMEOUT", "p5.3.safe"]);
     let text = at.run(&format!("config import {path} --restart")).fine();
     let rows = [
         "COMM_TIMEOUT  0.0 s     2.5 s\n",
@@ -202,10 +192,7 @@ fn a_raw_pdu_is_sent_and_both_frames_are_shown() {
         );
     }
     let text = modbus_tcp.run("raw 02 0010 0004").fine();
-    assert!(
-        text.contains("read discrete inputs 0x0010 = 0000"),
-        "{text}"
-    );
+    has(&text, &["read discrete inputs 0x0010 = 0000"]);
 }
 
 #[test]
@@ -244,7 +231,7 @@ fn each_of_three_boards_on_a_line_answers_for_itself() {
         Unit::with(2, &["--module", "4di"]),
         Unit::with(30, &["--module", "4ao"]),
     ];
-    let at = At::tcp(bus::of(&units.each_ref().map(|unit| unit.tcp), 0));
+    let at = At::tcp(bus::of(&units.each_ref().map(|unit| unit.tcp), |_| {}));
     let text = at.run("--timeout 600ms scan --units 1-3,29,30").fine();
     let lines: Vec<_> = text
         .lines()

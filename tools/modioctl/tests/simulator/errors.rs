@@ -1,15 +1,14 @@
 //! Tests of each exit status.
 
-use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener};
 use std::os::unix::fs::{PermissionsExt, chown};
 use std::path::PathBuf;
-use std::thread;
 
 use modioctl::bus::adu::Framing;
 
 use crate::ordinary::Ordinary;
-use crate::program::{At, Ran, modioctl};
+use crate::program::{At, Ran, has, modioctl};
+use crate::served::serve_requests;
 use crate::unit::Unit;
 
 #[test]
@@ -18,10 +17,7 @@ fn a_refused_request_is_status_1() {
     let unit = Unit::with(1, &["--module", "4di"]);
     let at = At::tcp(unit.tcp);
     let text = at.run("read 0x0090").failed(1);
-    assert!(
-        text.contains("exception 02") && text.contains("no such"),
-        "{text}"
-    );
+    has(&text, &["exception 02", "no such"]);
     assert_eq!(at.run("raw 41").status, 1);
 }
 
@@ -35,10 +31,7 @@ fn a_module_that_is_not_plugged_in_is_status_1() {
     unit.wait(500);
     let at = At::tcp(unit.tcp);
     let text = at.run("write p5.1=100").failed(1);
-    assert!(
-        text.contains("exception 04") && text.contains("plugged in"),
-        "{text}"
-    );
+    has(&text, &["exception 04", "plugged in"]);
     let text = at.run("read p5.module_state").fine();
     assert_eq!(text, "p5.module_state  not answering\n");
 }
@@ -113,39 +106,21 @@ fn a_wrong_rate_is_status_3_or_4() {
 
 /// Two units with address 1: their answers collide on the line, where a 0 overrides a 1.
 fn two_units_with_one_address() -> SocketAddr {
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let address = listener.local_addr().unwrap();
-    thread::spawn(move || {
-        for mut master in listener.incoming().flatten() {
-            let mut bytes = [0; 512];
-            while let Ok(count @ 1..) = master.read(&mut bytes) {
-                let Some((1, pdu)) = Framing::Rtu.open(&bytes[..count]) else {
-                    continue;
-                };
-                // Their replies to function 11 are equal, because they are of one kind; all others differ.
-                let differs = pdu[0] != 0x11;
-                let answer = |unit: u8| [pdu[0], 2, 0x55, if differs { unit } else { 0xFF }];
-                let [one, other] = [1, 2].map(|unit| Framing::Rtu.frame(0, 1, &answer(unit)));
-                let both: Vec<_> = one
-                    .iter()
-                    .zip(other)
-                    .map(|(one, other)| one & other)
-                    .collect();
-                master.write_all(&both).unwrap();
-            }
-        }
-    });
-    address
+    serve_requests(|unit, pdu| {
+        // Their replies to function 11 are equal, because they are of one kind; all others differ.
+        let differs = pdu[0] != 0x11;
+        let answer = |unit: u8| [pdu[0], 2, 0x55, if differs { unit } else { 0xFF }];
+        let [one, other] = [1, 2].map(|unit| Framing::Rtu.frame(0, 1, &answer(unit)));
+        let both = one.iter().zip(other).map(|(one, other)| one & other);
+        Some(both.filter(|_| unit == 1).collect())
+    })
 }
 
 #[test]
 fn two_units_with_one_address_are_status_4() {
     let at = At::tcp(two_units_with_one_address());
     let text = at.run("--timeout 200ms info").failed(4);
-    assert!(
-        text.contains("garbled") && text.contains("two units"),
-        "{text}"
-    );
+    has(&text, &["garbled", "two units"]);
     let ran = at.run("scan --units 1-3");
     assert_eq!(ran.status, 4, "{ran:?}");
     let told = "something answers, but garbled, at address 1";
@@ -156,10 +131,7 @@ fn two_units_with_one_address_are_status_4() {
 #[ignore = "needs the simulator: cargo xtask test"]
 fn a_port_that_cannot_be_opened_is_status_5() {
     let text = At::port("/dev/nowhere").run("info").failed(5);
-    assert!(
-        text.contains("there is no port /dev/nowhere; this computer has"),
-        "{text}"
-    );
+    has(&text, &["there is no port /dev/nowhere; this computer has"]);
     // A free port that nobody listens on.
     let free = TcpListener::bind("127.0.0.1:0")
         .unwrap()

@@ -2,14 +2,15 @@
 //! end every command.
 
 use std::io::{Read, Write};
-use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::net::SocketAddr;
 use std::thread;
 use std::time::Duration;
 
-use modbus_reference::{Device, Server, framed};
+use modbus_reference::{Device, Server};
 use modioctl::bus::adu::Framing;
 
 use crate::program::At;
+use crate::served::{response, serve, serve_requests};
 
 /// Commands with requests whose responses equal the request.
 const COMMANDS: [&str; 10] = [
@@ -25,20 +26,6 @@ const COMMANDS: [&str; 10] = [
     "raw 41 00",
 ];
 
-/// Serves each connection in a new thread.
-fn serve(connection: impl Fn(TcpStream) + Clone + Send + 'static) -> SocketAddr {
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let address = listener.local_addr().unwrap();
-    thread::spawn(move || {
-        for master in listener.incoming().flatten() {
-            master.set_nodelay(true).unwrap();
-            let connection = connection.clone();
-            thread::spawn(move || connection(master));
-        }
-    });
-    address
-}
-
 /// An adapter that returns what it sends. With `delay` there is also a unit with address 1, which answers after that
 /// time.
 fn echo(delay: Option<Duration>) -> SocketAddr {
@@ -52,10 +39,8 @@ fn echo(delay: Option<Duration>) -> SocketAddr {
             let (Some(delay), Some((1, pdu))) = (delay, Framing::Rtu.open(&bytes[..count])) else {
                 continue;
             };
-            let answer = server.answer(&pdu);
-            let answer = answer.unwrap_or_else(|code| vec![pdu[0] | 0x80, code]);
             thread::sleep(delay);
-            let _ = master.write_all(&framed(None, 1, &answer));
+            let _ = master.write_all(&response(&mut server, 1, &pdu));
         }
     })
 }
@@ -97,19 +82,14 @@ fn an_echo_that_begins_late_and_in_pieces_is_not_mistaken_for_a_unit() {
 #[test]
 fn texts_of_a_unit_have_escapes_for_control_characters() {
     const TEXT: &[u8] = b"\x1b[31m\x07\r\n\x7fA";
-    let unit = serve(|mut master| {
-        let mut bytes = [0; 512];
-        while let Ok(count @ 1..) = master.read(&mut bytes) {
-            let (unit, pdu) = Framing::Rtu.open(&bytes[..count]).unwrap();
-            let length = TEXT.len() as u8;
-            let answer = match pdu[0] {
-                0x11 => [&[0x11, length + 1], TEXT, &[0xFF]].concat(),
-                0x2B => [&[0x2B, 0x0E, 3, 3, 0, 0, 1, 0, length][..], TEXT].concat(),
-                function => vec![function | 0x80, 1],
-            };
-            let frame = Framing::Rtu.frame(0, unit, &answer);
-            master.write_all(&frame).unwrap();
-        }
+    let unit = serve_requests(|unit, pdu| {
+        let length = TEXT.len() as u8;
+        let answer = match pdu[0] {
+            0x11 => [&[0x11, length + 1], TEXT, &[0xFF]].concat(),
+            0x2B => [&[0x2B, 0x0E, 3, 3, 0, 0, 1, 0, length][..], TEXT].concat(),
+            function => vec![function | 0x80, 1],
+        };
+        Some(Framing::Rtu.frame(0, unit, &answer))
     });
     for (words, is_text) in [
         ("--trace scan --units 1", true),

@@ -1,72 +1,31 @@
 //! Tests of `modioctl config import` with a unit that this test serves.
 
-use std::io::{Read, Write};
-use std::net::{SocketAddr, TcpListener};
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
-use std::thread;
 
-use modio_description::{checksum, describe};
-use modioctl::bus::adu::Framing;
+use modbus_reference::Server;
 use register_map::Module;
-use register_map::board::MODIO_02;
 use register_map::configuration::{COMM_TIMEOUT, LORA_ADDRESS, MODULE};
-use register_map::state::{BOARD, DESCRIPTION_CRC, MODULE_IN_FORCE, PRODUCT, PRODUCT_CODE};
 
 use crate::program::At;
+use crate::served::{modio_02, response, serve_requests, server};
 use crate::terminal::Terminal;
 
-type Words = Arc<Mutex<Vec<u16>>>;
+type Shared = Arc<Mutex<Server>>;
 
-/// Returns a modio-02 with a 4do, and its registers. It does not answer a write to `silent_at`.
-fn unit(silent_at: u16) -> (SocketAddr, Words) {
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let address = listener.local_addr().unwrap();
-    let mut words = vec![0_u16; 0x400];
-    let description = describe(&MODIO_02, "0.0.0", |_| Module::Do4);
-    for (at, word) in [
-        (PRODUCT_CODE, (PRODUCT >> 16) as u16),
-        (PRODUCT_CODE + 1, PRODUCT as u16),
-        (BOARD, 1),
-        (DESCRIPTION_CRC, checksum(&description.encode())),
-        (MODULE + 4, Module::Do4.code()),
-        (MODULE_IN_FORCE + 4, Module::Do4.code()),
-    ] {
-        words[usize::from(at)] = word;
-    }
-    let words = Arc::new(Mutex::new(words));
-    let served = Arc::clone(&words);
-    thread::spawn(move || {
-        for mut master in listener.incoming().flatten() {
-            let mut bytes = [0; 512];
-            while let Ok(count @ 1..) = master.read(&mut bytes) {
-                let (unit, pdu) = Framing::Rtu.open(&bytes[..count]).unwrap();
-                let word = |at: usize| u16::from_be_bytes([pdu[at], pdu[at + 1]]);
-                let first = usize::from(word(1));
-                let mut words = served.lock().unwrap();
-                let answer = match pdu[0] {
-                    3 => {
-                        let words = &words[first..][..word(3).into()];
-                        let bytes: Vec<_> = words.iter().flat_map(|w| w.to_be_bytes()).collect();
-                        [vec![3, bytes.len() as u8], bytes].concat()
-                    }
-                    6 if word(1) == silent_at => continue,
-                    6 => {
-                        words[first] = word(3);
-                        pdu.clone()
-                    }
-                    function => vec![function | 0x80, 1],
-                };
-                master
-                    .write_all(&Framing::Rtu.frame(0, unit, &answer))
-                    .unwrap();
-            }
-        }
+/// Returns a modio-02 with a 4do. It does not answer a write to `silent_at`.
+fn unit(silent_at: u16) -> (SocketAddr, Shared) {
+    let server = Arc::new(Mutex::new(server(modio_02(Module::Do4))));
+    let served = Arc::clone(&server);
+    let address = serve_requests(move |unit, pdu| {
+        let silent = pdu[0] == 6 && pdu[1..3] == silent_at.to_be_bytes();
+        let answer = || response(&mut served.lock().unwrap(), unit, pdu);
+        Some(if silent { Vec::new() } else { answer() })
     });
-    (address, words)
+    (address, server)
 }
 
-/// Returns a file with this text, and its folder.
 fn file(text: &str) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("unit.toml");
@@ -74,8 +33,8 @@ fn file(text: &str) -> (tempfile::TempDir, PathBuf) {
     (folder, path)
 }
 
-fn word(words: &Words, address: u16) -> u16 {
-    words.lock().unwrap()[usize::from(address)]
+fn word(unit: &Shared, address: u16) -> u16 {
+    unit.lock().unwrap().device.words[usize::from(address)]
 }
 
 #[test]

@@ -1,48 +1,23 @@
 //! Tests of `modioctl sniff` next to a master.
 
-use std::io::{Read, Write};
-use std::net::{SocketAddr, TcpListener, TcpStream};
-use std::sync::mpsc::{Receiver, channel};
+use std::io::Write;
+use std::net::TcpListener;
+use std::sync::mpsc::channel;
 use std::time::Duration;
 
 use portable_pty::{PtySize, native_pty_system};
 
+use crate::bus;
 use crate::program::At;
 use crate::unit::Unit;
-
-/// Returns a line that a master can connect to, and all bytes on it in both directions.
-fn tapped(line: SocketAddr) -> (SocketAddr, Receiver<Vec<u8>>) {
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let address = listener.local_addr().unwrap();
-    let (heard, hear) = channel();
-    std::thread::spawn(move || {
-        for mut master in listener.incoming().flatten() {
-            let mut unit = TcpStream::connect(line).unwrap();
-            let mut to_master = master.try_clone().unwrap();
-            let mut from_unit = unit.try_clone().unwrap();
-            let also_heard = heard.clone();
-            std::thread::spawn(move || {
-                let mut bytes = [0; 512];
-                while let Ok(count @ 1..) = from_unit.read(&mut bytes) {
-                    let _ = also_heard.send(bytes[..count].to_vec());
-                    let _ = to_master.write_all(&bytes[..count]);
-                }
-            });
-            let mut bytes = [0; 512];
-            while let Ok(count @ 1..) = master.read(&mut bytes) {
-                let _ = heard.send(bytes[..count].to_vec());
-                let _ = unit.write_all(&bytes[..count]);
-            }
-            let _ = unit.shutdown(std::net::Shutdown::Both);
-        }
-    });
-    (address, hear)
-}
 
 /// A master writes and reads an output twice, and the bytes on the line are passed to the listener.
 fn both_directions_are_shown(listener: &At, mut carry: impl FnMut(&[u8])) {
     let unit = Unit::with(1, &["--module", "4do"]);
-    let (line, hear) = tapped(unit.tcp);
+    let (heard, hear) = channel();
+    let line = bus::of(&[unit.tcp], move |bytes| {
+        let _ = heard.send(bytes.to_vec());
+    });
     let folder = tempfile::tempdir().unwrap();
     let capture = folder.path().join("line.pcapng");
     let mut listener = listener.start(&format!("sniff --record {}", capture.display()));

@@ -10,13 +10,14 @@ mod gateway;
 mod hostile;
 mod importing;
 mod listening;
+mod monitor;
 mod newer;
 mod ordinary;
 mod program;
 mod restart;
 mod scanning;
 mod screen;
-#[path = "../terminal/mod.rs"]
+mod served;
 mod terminal;
 mod trouble;
 mod unit;

@@ -40,21 +40,18 @@ impl Ran {
     }
 }
 
+/// Asserts that a text has these parts.
+#[track_caller]
+pub fn has(text: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+}
+
 /// Returns the program, without the settings of this machine's user.
 pub fn modioctl(endpoint: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_modioctl"));
-    for name in [
-        "PORT",
-        "TCP",
-        "MODBUS_TCP",
-        "BAUD",
-        "FORMAT",
-        "MODE",
-        "UNIT",
-        "TIMEOUT",
-        "RETRIES",
-        "AT",
-    ] {
+    for name in "PORT TCP MODBUS_TCP BAUD FORMAT MODE UNIT TIMEOUT RETRIES AT".split(' ') {
         command.env_remove(format!("MODIO_{name}"));
     }
     command.args(endpoint);

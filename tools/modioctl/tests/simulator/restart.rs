@@ -1,14 +1,15 @@
 //! Tests of a restart after which the unit has other line settings, or not.
 
 use std::io::{Read, Write};
-use std::net::{SocketAddr, TcpListener};
-use std::thread;
+use std::net::SocketAddr;
+use std::sync::{Arc, Mutex};
 
 use modioctl::bus::adu::Framing;
 use register_map::configuration::{BAUD, COMMAND, KEY, MODE};
 use register_map::state::UPTIME;
 
 use crate::program::At;
+use crate::served::{answer, serve, server};
 use crate::unit::Unit;
 
 /// What a restart does.
@@ -24,46 +25,30 @@ enum Restart {
 
 /// A unit over TCP in RTU mode whose registers announce ASCII mode.
 fn unit(mode: Restart) -> SocketAddr {
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let address = listener.local_addr().unwrap();
-    thread::spawn(move || {
-        let mut framing = Framing::Rtu;
-        for mut master in listener.incoming().flatten() {
-            master.set_nodelay(true).unwrap();
-            let mut words = vec![0_u16; 0x400];
-            words[usize::from(UPTIME) + 1] = 1000;
-            words[usize::from(BAUD)] = 96;
-            words[usize::from(MODE)] = 1;
-            let mut bytes = [0; 512];
-            while let Ok(count @ 1..) = master.read(&mut bytes) {
-                let Some((unit, pdu)) = framing.open(&bytes[..count]) else {
-                    continue;
+    let framing = Arc::new(Mutex::new(Framing::Rtu));
+    serve(move |mut master| {
+        let mut server = server([(UPTIME + 1, 1000), (BAUD, 96), (MODE, 1)]);
+        let mut bytes = [0; 512];
+        while let Ok(count @ 1..) = master.read(&mut bytes) {
+            let mut framing = framing.lock().unwrap();
+            let Some((unit, pdu)) = framing.open(&bytes[..count]) else {
+                continue;
+            };
+            let answer = answer(&mut server, &pdu);
+            master.write_all(&framing.frame(0, unit, &answer)).unwrap();
+            if pdu[0] == 6 && pdu[1..3] == COMMAND.to_be_bytes() {
+                server.device.words[usize::from(UPTIME) + 1] = 0;
+                *framing = match mode {
+                    Restart::Saved => Framing::Ascii,
+                    Restart::Unsaved => Framing::Rtu,
+                    // Nothing more is answered.
+                    Restart::Gateway => Framing::Mbap,
                 };
-                let word = |at: usize| u16::from_be_bytes([pdu[at], pdu[at + 1]]);
-                let answer = match pdu[0] {
-                    3 => {
-                        let words = &words[word(1).into()..][..word(3).into()];
-                        let bytes: Vec<_> = words.iter().flat_map(|w| w.to_be_bytes()).collect();
-                        [vec![3, bytes.len() as u8], bytes].concat()
-                    }
-                    _ => pdu.clone(),
-                };
-                master.write_all(&framing.frame(0, unit, &answer)).unwrap();
-                if pdu[0] == 6 && word(1) == COMMAND {
-                    words[usize::from(UPTIME) + 1] = 0;
-                    framing = match mode {
-                        Restart::Saved => Framing::Ascii,
-                        Restart::Unsaved => Framing::Rtu,
-                        // Nothing more is answered.
-                        Restart::Gateway => Framing::Mbap,
-                    };
-                } else if pdu[0] == 6 {
-                    assert_eq!(word(1), KEY);
-                }
+            } else if pdu[0] == 6 {
+                assert_eq!(pdu[1..3], KEY.to_be_bytes());
             }
         }
-    });
-    address
+    })
 }
 
 #[test]

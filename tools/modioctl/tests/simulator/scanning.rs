@@ -8,9 +8,10 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use modbus_reference::{Device, Server, framed};
-use modioctl::bus::adu::Framing;
+use modioctl::bus::adu::{Framing, request_length};
 
 use crate::program::At;
+use crate::served::{response, serve_requests};
 use crate::unit::Unit;
 
 /// The shortest time-out with which a master finds every unit when it waits for each in turn: V1.02, 2.4.1, gives
@@ -21,29 +22,15 @@ const SENSIBLE: Duration = Duration::from_millis(100);
 /// arrived.
 fn bus(addresses: BTreeSet<u8>, delay: Duration) -> (SocketAddr, Receiver<(u8, Instant)>) {
     let (tell, requests) = mpsc::channel();
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let address = listener.local_addr().unwrap();
-    thread::spawn(move || {
-        for mut master in listener.incoming().flatten() {
-            master.set_nodelay(true).unwrap();
-            let mut server = Server::new(None, Device::new(4, 4));
-            let mut bytes = [0; 512];
-            while let Ok(count @ 1..) = master.read(&mut bytes) {
-                let Some((unit, pdu)) = Framing::Rtu.open(&bytes[..count]) else {
-                    continue;
-                };
-                // Some tests do not listen.
-                let _ = tell.send((unit, Instant::now()));
-                if !addresses.contains(&unit) {
-                    continue;
-                }
-                let answer = server
-                    .answer(&pdu)
-                    .unwrap_or_else(|code| vec![pdu[0] | 0x80, code]);
-                thread::sleep(delay);
-                master.write_all(&framed(None, unit, &answer)).unwrap();
-            }
+    let mut server = Server::new(None, Device::new(4, 4));
+    let address = serve_requests(move |unit, pdu| {
+        // Some tests do not listen.
+        let _ = tell.send((unit, Instant::now()));
+        if !addresses.contains(&unit) {
+            return Some(Vec::new());
         }
+        thread::sleep(delay);
+        Some(response(&mut server, unit, pdu))
     });
     (address, requests)
 }
@@ -134,13 +121,15 @@ fn delayed(addresses: &[u8]) -> (SocketAddr, Receiver<u8>) {
             match (master.read(&mut bytes), answer.take()) {
                 (Ok(0), _) => return,
                 (Ok(count), _) => {
-                    // On a busy host one read may return several requests of the scan, which have 8 bytes each.
-                    for request in bytes[..count].chunks(8) {
+                    // On a busy host one read may return several requests of the scan.
+                    let mut rest = &bytes[..count];
+                    while let Some(length) = request_length(rest) {
+                        let (request, after) = rest.split_at(length);
+                        rest = after;
                         let (unit, pdu) = Framing::Rtu.open(request).unwrap();
                         let _ = tell.send(unit);
-                        let pdu = server.answer(&pdu);
-                        let pdu = pdu.unwrap_or_else(|code| vec![request[1] | 0x80, code]);
-                        answer = addresses.contains(&unit).then(|| framed(None, unit, &pdu));
+                        let frame = response(&mut server, unit, &pdu);
+                        answer = addresses.contains(&unit).then_some(frame);
                     }
                 }
                 (Err(_), Some(answer)) => master.write_all(&answer).unwrap(),

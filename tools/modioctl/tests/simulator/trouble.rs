@@ -16,7 +16,7 @@ fn four_hundred_polls_over_a_line_with_bit_errors_show_no_wrong_value() {
     direct.run("config save").fine();
     direct.run("reboot").fine();
     direct.run("write p5.1=on p5.3=on").fine();
-    let at = At::tcp(bus::of(&[unit.tcp], 10_000));
+    let at = At::tcp(bus::of(&[unit.tcp], bus::noise(10_000)));
     let words = "--baud 115200 --timeout 150ms --retries 9 watch p5.1 p5.2 p5.3 p5.4 BAUD p5.1.safe product_code --every 1ms --count 400 --csv";
     let text = at.run(words).fine();
     let mut lines = text.lines();

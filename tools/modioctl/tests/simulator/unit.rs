@@ -90,7 +90,6 @@ impl Unit {
         }
     }
 
-    /// Sends a request and returns the body of the answer.
     fn request(&self, method: &str, path: &str, body: &str) -> String {
         let mut stream = TcpStream::connect(self.http).unwrap();
         let length = body.len();

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use std::ops::Range;
 use std::path::Path;
 
-use modio_description::{Description, Unit};
+use modio_description::{Description, Unit, Value};
 use register_map::codes::{Format, Mode};
 use register_map::configuration::{FORMAT, MODE, module_of};
 use toml::de::{DeTable, DeValue};
@@ -16,10 +16,6 @@ use crate::names::{Book, Item, Meaning, port_of, slots};
 use crate::value::{parse, show, takes};
 
 /// Returns the text of a file.
-///
-/// # Errors
-///
-/// When the unit is not a modio.
 pub fn text(book: &Book, items: &[Item], values: &[Vec<u16>]) -> Result<String, Failure> {
     let about = book.of_modio()?;
     let mut text = format!(
@@ -32,12 +28,8 @@ pub fn text(book: &Book, items: &[Item], values: &[Vec<u16>]) -> Result<String, 
             serde_json::Value::String(name) => toml::Value::String(name.clone()).to_string(),
             _ => shown.text.clone(),
         };
-        let _ = writeln!(
-            text,
-            "{} = {value}  # {}",
-            item.name,
-            comment(item, &shown.unit)
-        );
+        let comment = comment(item, &shown.unit);
+        let _ = writeln!(text, "{} = {value}  # {comment}", item.name);
     }
     Ok(text)
 }
@@ -48,16 +40,9 @@ fn comment(item: &Item, unit: &str) -> String {
         .trim_start_matches("By point. ")
         .trim_start_matches("By port. ");
     let takes = match (&item.meaning, &item.values) {
-        (Meaning::Value(modio_description::Value::Number(of)), Some(values)) => takes(values, of),
-        (_, Some(values))
-            if unit.is_empty()
-                && !matches!(
-                    item.meaning,
-                    Meaning::Value(modio_description::Value::Codes(_))
-                ) =>
-        {
-            takes(values, &Unit::default())
-        }
+        (Meaning::Value(Value::Number(of)), Some(values)) => takes(values, of),
+        (Meaning::Value(Value::Codes(_)), _) => String::new(),
+        (_, Some(values)) if unit.is_empty() => takes(values, &Unit::default()),
         _ => String::new(),
     };
     let takes = takes.trim_start_matches("it takes ");
@@ -67,7 +52,6 @@ fn comment(item: &Item, unit: &str) -> String {
     }
 }
 
-/// A line of a file.
 #[derive(Debug, PartialEq, Eq)]
 struct Line {
     number: usize,
@@ -75,11 +59,8 @@ struct Line {
     value: String,
 }
 
-/// Reads the settings in a file and checks all of them, with the modules in the file.
-///
-/// # Errors
-///
-/// When the file cannot be read or is of another board, or all lines that are wrong.
+/// Reads the settings in a file and checks all of them, with the modules in the file. The error has all lines that are
+/// wrong.
 pub fn read(book: &Book, path: &Path) -> Result<Vec<Setting>, Failure> {
     let shown = path.display().to_string();
     let text = std::fs::read_to_string(path)
@@ -87,7 +68,6 @@ pub fn read(book: &Book, path: &Path) -> Result<Vec<Setting>, Failure> {
     check(book, &shown, &text)
 }
 
-/// Checks the text of the file with this name.
 fn check(book: &Book, file: &str, text: &str) -> Result<Vec<Setting>, Failure> {
     let (lines, mut wrong) = parsed(text);
     check_board(book.of_modio()?, file, &lines)?;
@@ -216,10 +196,6 @@ fn with_modules(book: &Book, lines: &[Line]) -> Result<(Book, Vec<Option<u8>>), 
 }
 
 /// Checks a name and a value.
-///
-/// # Errors
-///
-/// When one of them is wrong.
 pub fn setting(book: &Book, name: &str, value: &str) -> Result<Setting, Failure> {
     let item = book.find(name)?;
     if !item.setting {
@@ -244,15 +220,15 @@ fn is_consistent(settings: &[Setting]) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use modio_description::describe;
     use register_map::Module;
     use register_map::board::MODIO_02;
 
     use super::*;
+    use crate::names::book;
 
     fn checked(text: &str) -> Result<Vec<String>, String> {
-        let unit = describe(&MODIO_02, "0.1.0", |_| Module::None);
-        let settings = check(&Book::new(unit, Vec::new()), "unit.toml", text);
+        let unit = book(&MODIO_02, Module::None, (0, 0));
+        let settings = check(&unit, "unit.toml", text);
         let shown = |(item, words): Setting| format!("{}={}", item.name, words[0]);
         settings
             .map(|settings| settings.into_iter().map(shown).collect())

@@ -7,7 +7,6 @@ use std::io::{IsTerminal, stdin};
 use std::path::Path;
 
 use register_map::codes::Command;
-use register_map::state::{self, status};
 use register_map::{configuration, points};
 
 use super::read;
@@ -21,17 +20,12 @@ use crate::value::show;
 /// Largest number of registers that one request writes.
 const MOST: usize = 100;
 
-/// A setting with its words.
 type Setting = (Item, Vec<u16>);
 
 /// Text that Ctrl-C prints: how much of the command is done.
 pub type Note = RefCell<String>;
 
-/// Reads and changes settings.
-///
-/// # Errors
-///
-/// When a name, a value or a file is wrong; nothing is written then. When the unit does not answer or refuses.
+/// Reads and changes settings. When a name, a value or a file is wrong, nothing is written.
 pub async fn run(
     mut device: Device,
     options: Config,
@@ -47,8 +41,7 @@ pub async fn run(
     let book = of_modules(&book, set)?;
     match options {
         Config::Get { names } => {
-            let named = names.iter().map(|name| book.find(name));
-            let mut items: Vec<_> = named.collect::<Result<_, _>>()?;
+            let mut items = book.find_all(&names)?;
             if names.is_empty() {
                 items = book.settings().cloned().collect();
             }
@@ -63,14 +56,12 @@ pub async fn run(
             Progress::new(note, changes.len())
                 .write(&mut device, &changes)
                 .await?;
-            output::line(format_args!(
-                "written, but not saved: save with `modioctl config save`"
-            ))
+            output::line("written, but not saved: save with `modioctl config save`")
         }
         Config::Save => {
             device.unlock().await?;
             device.save().await?;
-            output::line(format_args!("saved"))?;
+            output::line("saved")?;
             tell_restart(&mut device).await
         }
         Config::Diff { file } => diff(&mut device, &book, file.as_deref()).await,
@@ -84,11 +75,9 @@ pub async fn run(
             let rows = differences(&mut device, &book, &wanted).await?;
             table(rows.clone(), "the file")?;
             let is_changed = |item: &Item| rows.iter().any(|[name, ..]| *name == item.name);
-            let modules = wanted.iter().filter(|(item, _)| is_module(item));
-            let modules: Vec<_> = modules
-                .filter(|(item, _)| is_changed(item))
-                .map(|(item, _)| item.name.as_str())
-                .collect();
+            let modules = wanted.iter().map(|(item, _)| item);
+            let modules = modules.filter(|item| is_module(item) && is_changed(item));
+            let modules: Vec<_> = modules.map(|item| item.name.as_str()).collect();
             if !modules.is_empty() && !yes {
                 agree(&modules.join(", ")).await?;
             }
@@ -106,7 +95,7 @@ pub async fn run(
                 .order(Command::LoadDefaults.code(), "loading the factory settings")
                 .await?;
             device.save().await?;
-            output::line(format_args!("the factory settings are saved"))?;
+            output::line("the factory settings are saved")?;
             finish(device, restart).await
         }
     }
@@ -118,7 +107,6 @@ fn of_modules(book: &Book, module: impl Fn(u8) -> Option<u16>) -> Result<Book, F
     Ok(Book::new(description, Vec::new()))
 }
 
-/// Returns all settings with their values.
 async fn settings(device: &mut Device, book: &Book) -> Result<(Vec<Item>, Vec<Vec<u16>>), Failure> {
     let items: Vec<_> = book.settings().cloned().collect();
     let values = device.read_items(&items).await?;
@@ -197,7 +185,7 @@ async fn diff(device: &mut Device, book: &Book, path: Option<&Path>) -> Result<(
     };
     let rows = differences(device, book, &wanted).await?;
     if rows.is_empty() {
-        return output::line(format_args!("no difference"));
+        return output::line("no difference");
     }
     table(rows, other)
 }
@@ -217,11 +205,9 @@ async fn differences(
             .find(|(known, _)| known.address == item.address);
         let now = now.map(|(_, words)| words);
         if now != Some(words) {
-            let now = now.map_or_else(
-                || "missing".to_owned(),
-                |words| show(item, words, false).to_string(),
-            );
-            rows.push([item.name.clone(), now, show(item, words, false).to_string()]);
+            let shown = |words: &Vec<u16>| show(item, words, false).to_string();
+            let now = now.map_or_else(|| "missing".to_owned(), shown);
+            rows.push([item.name.clone(), now, shown(words)]);
         }
     }
     Ok(rows)
@@ -236,11 +222,8 @@ fn table(mut rows: Vec<[String; 3]>, other: &str) -> Result<(), Failure> {
     output::table(&rows)
 }
 
-/// Asks whether the modules with these names may be changed.
-///
-/// # Errors
-///
-/// When the answer is not yes, or when nobody can answer.
+/// Asks whether the modules with these names may be changed. Fails when the answer is not yes, or when nobody can
+/// answer.
 async fn agree(modules: &str) -> Result<(), Failure> {
     let mut answer = String::new();
     if stdin().is_terminal() {
@@ -270,24 +253,18 @@ async fn import(
     progress: &mut Progress<'_>,
 ) -> Result<(), Failure> {
     device.unlock().await?;
-    let modules: Vec<_> = wanted
-        .iter()
-        .filter(|(item, _)| is_module(item))
-        .cloned()
-        .collect();
-    let modules = differing(device, &modules).await?;
+    let modules = wanted.iter().filter(|(item, _)| is_module(item));
+    let modules = differing(device, &modules.cloned().collect::<Vec<_>>()).await?;
     progress.write(device, &modules).await?;
     let mut changes = differing(device, wanted).await?;
     // FORMAT and MODE must be compatible, so write both or none.
     let line = configuration::FORMAT..=configuration::MODE;
     if changes.iter().any(|(item, _)| line.contains(&item.address)) {
         changes.retain(|(item, _)| !line.contains(&item.address));
-        changes.extend(
-            wanted
-                .iter()
-                .filter(|(item, _)| line.contains(&item.address))
-                .cloned(),
-        );
+        let both = wanted
+            .iter()
+            .filter(|(item, _)| line.contains(&item.address));
+        changes.extend(both.cloned());
     }
     progress.all = progress.done + changes.len();
     progress.write(device, &changes).await?;
@@ -300,7 +277,7 @@ async fn import(
         )));
     }
     if progress.done == 0 {
-        output::line(format_args!("the unit has these settings already"))?;
+        output::line("the unit has these settings already")?;
     } else {
         output::line(format_args!("{} settings written", progress.done))?;
     }
@@ -310,7 +287,7 @@ async fn import(
     );
     device.save().await?;
     progress.note.replace("the settings are saved".to_owned());
-    output::line(format_args!("saved"))
+    output::line("saved")
 }
 
 /// Returns the settings whose values differ from those of the unit.
@@ -318,10 +295,8 @@ async fn differing(device: &mut Device, wanted: &[Setting]) -> Result<Vec<Settin
     let items: Vec<_> = wanted.iter().map(|(item, _)| item.clone()).collect();
     let now = device.read_items(&items).await?;
     let both = wanted.iter().zip(now);
-    Ok(both
-        .filter(|((_, words), now)| words != now)
-        .map(|(change, _)| change.clone())
-        .collect())
+    let differing = both.filter(|((_, words), now)| words != now);
+    Ok(differing.map(|(change, _)| change.clone()).collect())
 }
 
 /// Restarts the unit if that is wanted and needed. Prints a note if it is needed but not wanted.
@@ -329,24 +304,17 @@ async fn finish(mut device: Device, restart: bool) -> Result<(), Failure> {
     if !restart {
         return tell_restart(&mut device).await;
     }
-    if waits(&mut device).await? {
+    if device.waits_for_restart().await? {
         device.unlock().await?;
         device.restart().await?;
-        output::line(format_args!("restarted: all settings are in force"))?;
+        output::line("restarted: all settings are in force")?;
     }
     Ok(())
 }
 
-async fn waits(device: &mut Device) -> Result<bool, Failure> {
-    let words = device.read_words(state::STATUS, 1).await?;
-    Ok(words.iter().any(|word| word & status::RESTART_NEEDED != 0))
-}
-
 async fn tell_restart(device: &mut Device) -> Result<(), Failure> {
-    if waits(device).await? {
-        output::line(format_args!(
-            "some settings take effect after a restart: use `modioctl reboot`"
-        ))?;
+    if device.waits_for_restart().await? {
+        output::line("some settings take effect after a restart: use `modioctl reboot`")?;
     }
     Ok(())
 }

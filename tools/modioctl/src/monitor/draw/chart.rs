@@ -10,7 +10,6 @@ use tokio::time::Instant;
 
 use super::{OLD, STRONG, titled};
 use crate::monitor::history::{SPAN, extent};
-use crate::monitor::layout::Parts;
 use crate::monitor::link::ago;
 use crate::monitor::model::Model;
 use crate::monitor::tree::Row;
@@ -23,9 +22,8 @@ pub fn draw(frame: &mut Frame, model: &Model, area: Rect, now: Instant) {
         return;
     }
     match model.tree.selected() {
-        None => frame.render_widget(titled("Selected".to_owned(), false), area),
+        None => frame.render_widget(titled("Selected", false), area),
         Some(Row::Port(port)) => {
-            frame.render_widget(titled(format!("p{}", port.number), false), area);
             let text = if model.waits(port.number) {
                 "MODULE of this port has been changed. RANGE and SCALE belong to the new module, so the monitor cannot say what the analog values mean. Restart the unit."
             } else if port.points.is_empty() {
@@ -34,7 +32,8 @@ pub fn draw(frame: &mut Frame, model: &Model, area: Rect, now: Instant) {
                 model.refusal(port.number).unwrap_or("Select a point.")
             };
             let paragraph = Paragraph::new(text).wrap(Wrap { trim: true });
-            frame.render_widget(paragraph, Parts::inside(area));
+            let block = titled(format!("p{}", port.number), false);
+            frame.render_widget(paragraph.block(block), area);
         }
         Some(Row::Point(item)) => match &item.meaning {
             Meaning::Analog(_) => chart(frame, model, item, area, now),
@@ -44,24 +43,21 @@ pub fn draw(frame: &mut Frame, model: &Model, area: Rect, now: Instant) {
 }
 
 fn facts(frame: &mut Frame, model: &Model, item: &Item, area: Rect, now: Instant) {
-    frame.render_widget(titled(item.name.clone(), false), area);
     let value = model.value(&item.name, now);
     let mut lines = vec![
         Line::from(item.about.clone()),
         Line::from(format!("address {:#06X}", item.address)),
     ];
-    lines.push(match value {
-        None => Line::from(Span::styled("value not known", OLD)),
-        Some((value, true)) => Line::from(Span::styled(
-            show(item, &value.words, false).to_string(),
-            STRONG,
-        )),
+    let (text, style) = match value {
+        None => ("value not known".to_owned(), OLD),
+        Some((value, true)) => (show(item, &value.words, false).to_string(), STRONG),
         Some((value, false)) => {
             let age = ago(now.saturating_duration_since(value.at));
             let was = show(item, &value.words, false);
-            Line::from(Span::styled(format!("was {was}, {age} ago"), OLD))
+            (format!("was {was}, {age} ago"), OLD)
         }
-    });
+    };
+    lines.push(Line::from(Span::styled(text, style)));
     if item.writable {
         lines.push(Line::default());
         lines.push(Line::from("Space switches it."));
@@ -69,10 +65,8 @@ fn facts(frame: &mut Frame, model: &Model, item: &Item, area: Rect, now: Instant
     if item.meaning == Meaning::Unknown {
         lines.push(Line::from("RANGE and SCALE are not known."));
     }
-    frame.render_widget(
-        Paragraph::new(lines).wrap(Wrap { trim: true }),
-        Parts::inside(area),
-    );
+    let facts = Paragraph::new(lines).wrap(Wrap { trim: true });
+    frame.render_widget(facts.block(titled(&item.name, false)), area);
 }
 
 fn chart(frame: &mut Frame, model: &Model, item: &Item, area: Rect, now: Instant) {

@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use ratatui::Frame;
-use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::layout::Constraint::{Fill, Length};
+use ratatui::layout::{Layout, Rect};
 use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
@@ -15,7 +16,6 @@ use crate::monitor::model::Model;
 use crate::monitor::plan::Plan;
 use crate::value::show;
 
-/// Width of the name of a counter.
 const NAME: usize = 25;
 
 /// Draws the counters.
@@ -23,19 +23,11 @@ pub fn draw(frame: &mut Frame, model: &Model, area: Rect, now: Instant) {
     if area.is_empty() {
         return;
     }
-    let [left, _, right] = Layout::horizontal([
-        Constraint::Fill(1),
-        Constraint::Length(1),
-        Constraint::Fill(1),
-    ])
-    .areas(area);
+    let [left, _, right] = Layout::horizontal([Fill(1), Length(1), Fill(1)]).areas(area);
     let unit = Paragraph::new(of_unit(model, left.width, now));
-    frame.render_widget(
-        unit.block(titled("Counted by the unit".to_owned(), false)),
-        left,
-    );
+    frame.render_widget(unit.block(titled("Counted by the unit", false)), left);
     let own = Paragraph::new(of_program(model, right.width));
-    frame.render_widget(own.block(titled("Counted here".to_owned(), false)), right);
+    frame.render_widget(own.block(titled("Counted here", false)), right);
 }
 
 fn of_unit(model: &Model, width: u16, now: Instant) -> Vec<Line<'static>> {

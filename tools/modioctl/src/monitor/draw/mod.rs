@@ -8,6 +8,8 @@ mod overlay;
 mod tests;
 mod tree;
 
+use std::fmt::Display;
+
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Modifier, Style};
@@ -16,7 +18,7 @@ use ratatui::widgets::{Block, Borders, Paragraph, Wrap};
 use tokio::time::Instant;
 
 use super::input::focus;
-use super::layout::{AGAIN, DROP, LEAST, Parts};
+use super::layout::{AGAIN, DROP, LEAST, Parts, within};
 use super::link::{State, ago};
 use super::model::{Focus, Model};
 
@@ -45,19 +47,15 @@ pub fn draw(frame: &mut Frame, model: &mut Model, now: Instant) {
     overlay::help(frame, model);
 }
 
-/// Colour of a good state.
 const GOOD: Style = Style::new().fg(Color::Green);
-/// Colour of faults.
 const BAD: Style = Style::new().fg(Color::Red).add_modifier(Modifier::BOLD);
 /// Style of values that are not fresh.
 const OLD: Style = Style::new().add_modifier(Modifier::DIM);
-/// Style of emphasised text.
 const STRONG: Style = Style::new().add_modifier(Modifier::BOLD);
-/// Style of selected text.
 const SELECTED: Style = Style::new().add_modifier(Modifier::REVERSED);
 
 /// Returns a part with a title. The title of the part that receives the keys is emphasised.
-fn titled(title: String, focused: bool) -> Block<'static> {
+fn titled(title: impl Display, focused: bool) -> Block<'static> {
     let style = if focused { STRONG } else { Style::new() };
     let mark = if focused { "» " } else { "" };
     Block::new()
@@ -86,7 +84,6 @@ fn head(frame: &mut Frame, model: &Model, area: Rect, now: Instant) {
     frame.render_widget(right, area);
 }
 
-/// Returns the state of the connection, for people.
 fn state(model: &Model, now: Instant) -> (String, Style) {
     let since = |what: &str, duration| format!("× {what}no answer since {}", ago(duration));
     match model.link.state(now) {
@@ -122,7 +119,7 @@ fn message(frame: &mut Frame, model: &Model, parts: &Parts, now: Instant) {
             1 => String::new(),
             count => format!("  ({} more failed)", count - 1),
         };
-        let [first, second] = rows(area);
+        let [first, second] = [0, 1].map(|y| within(area, 0, y, area.width, 1));
         let text = clip(&format!("× {}", failed.text), first.width.into());
         frame.render_widget(Span::styled(text, BAD), first);
         let buttons = format!("{AGAIN} {DROP}{more}");
@@ -130,26 +127,12 @@ fn message(frame: &mut Frame, model: &Model, parts: &Parts, now: Instant) {
         return;
     }
     let trouble = model.link.trouble().map(ToString::to_string);
-    let status = || {
-        model
-            .status(now)
-            .map(|text| format!("The unit reports: {text}"))
-    };
+    let status = model.status(now);
+    let status = || status.map(|text| format!("The unit reports: {text}"));
     let notice = model.notice(now).map(str::to_owned);
     let text = notice.or(trouble).or_else(status).unwrap_or_default();
     let paragraph = Paragraph::new(text).wrap(Wrap { trim: true });
     frame.render_widget(paragraph, area);
-}
-
-fn rows(area: Rect) -> [Rect; 2] {
-    [0, 1].map(|y| {
-        let row = Rect {
-            y: area.y.saturating_add(y),
-            height: 1,
-            ..area
-        };
-        row.intersection(area)
-    })
 }
 
 fn keys(frame: &mut Frame, model: &Model, area: Rect) {

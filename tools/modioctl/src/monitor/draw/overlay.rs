@@ -1,13 +1,12 @@
 //! Draws the slider and the help above the display.
 
 use ratatui::Frame;
-use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Clear, Paragraph, Wrap};
 use tokio::time::Instant;
 
 use super::{BAD, OLD, SELECTED, STRONG, clip};
-use crate::monitor::layout::{LEAVE, SEND, Slider, centred};
+use crate::monitor::layout::{LEAVE, SEND, Slider, centred, within};
 use crate::monitor::model::Model;
 use crate::value::show;
 
@@ -20,14 +19,7 @@ pub fn slider(frame: &mut Frame, model: &Model, now: Instant) {
     frame.render_widget(Clear, places.window);
     let title = format!(" {}, {} ", editor.item.name, editor.item.about);
     frame.render_widget(Block::bordered().title(title), places.window);
-    let row = |y: u16| {
-        let row = Rect {
-            y: places.window.y.saturating_add(y),
-            height: 1,
-            ..places.bar
-        };
-        row.intersection(places.window)
-    };
+    let row = |y| within(places.window, 2, y, places.bar.width, 1);
     let present = match model.value(&editor.item.name, now) {
         Some((value, true)) => show(&editor.item, &value.words, false).to_string(),
         _ => "not known".to_owned(),
@@ -64,7 +56,6 @@ pub fn slider(frame: &mut Frame, model: &Model, now: Instant) {
     frame.render_widget(Span::styled(clip(keys, width), OLD), row(7));
 }
 
-/// The help.
 const HELP: [(&str, &str); 14] = [
     ("↑ ↓ PgUp PgDn", "select a row, or scroll the log"),
     ("← →", "close or open a port"),

@@ -12,9 +12,10 @@ use super::draw;
 use crate::bus::adu::Framing;
 use crate::bus::{Direction, Seen};
 use crate::failure::Failure;
-use crate::monitor::fixture::{book, model, polled, show};
+use crate::monitor::fixture::{model, polled, show};
 use crate::monitor::messages::Update;
 use crate::monitor::model::{Model, Page};
+use crate::names::book;
 
 fn screen(model: &mut Model, width: u16, height: u16, now: Instant) -> Vec<String> {
     let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
@@ -170,7 +171,7 @@ fn page_of_the_line_has_counters_and_frames() {
 fn large_board_scrolls_and_a_large_terminal_shows_counters_beside_the_tree() {
     let now = Instant::now();
     let mut model = model(Module::Do4, now);
-    let eight = Box::new(book(&MODIO_08, Module::Do4, 0, 0));
+    let eight = Box::new(book(&MODIO_08, Module::Do4, (0, 0)));
     model.update(Update::Learned(eight), now);
     model.tree.select(19);
     let rows = screen(&mut model, 80, 24, now);

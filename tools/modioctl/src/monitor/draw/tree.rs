@@ -7,7 +7,7 @@ use ratatui::text::{Line, Span};
 use tokio::time::Instant;
 
 use super::{BAD, GOOD, OLD, SELECTED, clip, is_focused, titled};
-use crate::monitor::layout::{Parts, VALUE, VALUE_AT};
+use crate::monitor::layout::{Parts, VALUE, VALUE_AT, within};
 use crate::monitor::link::ago;
 use crate::monitor::model::{Focus, Model};
 use crate::monitor::tree::Row;
@@ -43,12 +43,7 @@ pub fn draw(frame: &mut Frame, model: &mut Model, area: Rect, now: Instant) {
         if index == model.tree.index() {
             line = line.style(SELECTED);
         }
-        let place = Rect {
-            y: inside.y.saturating_add(y),
-            height: 1,
-            ..inside
-        };
-        frame.render_widget(line, place.intersection(inside));
+        frame.render_widget(line, within(inside, 0, y, inside.width, 1));
     }
 }
 

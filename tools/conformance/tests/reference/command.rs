@@ -1,23 +1,5 @@
 //! The command: its exit status, its output and its files. It tests the reference server over a socket.
 
-#[path = "reference/fault.rs"]
-#[allow(dead_code, reason = "the list of faults is for the test of the cases")]
-mod fault;
-#[path = "reference/modio.rs"]
-#[allow(dead_code, reason = "the unit behind the socket is not a modio")]
-mod modio;
-#[path = "reference/modio_fault.rs"]
-#[allow(dead_code, reason = "the unit behind the socket is not a modio")]
-mod modio_fault;
-#[path = "reference/server.rs"]
-mod server;
-#[path = "reference/unit.rs"]
-#[allow(
-    dead_code,
-    reason = "an endpoint without exact time needs a part of it"
-)]
-mod unit;
-
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::process::{Command, Output};
@@ -25,9 +7,11 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use conformance::frame::Mode;
-use fault::Fault;
 use modbus_line::LineFormat;
-use unit::{Character, Unit};
+use tempfile::TempDir;
+
+use super::fault::Fault;
+use super::unit::{Character, Unit};
 
 const PROFILE: &str = r#"
 unit = 9
@@ -44,11 +28,23 @@ values = [1, 4000]
 refused = 5000
 "#;
 
-fn command(arguments: &[&str]) -> Output {
+/// Runs the command with these arguments, which spaces separate.
+fn command(arguments: &str) -> Output {
     Command::new(env!("CARGO_BIN_EXE_modio-conformance"))
-        .args(arguments)
+        .args(arguments.split_whitespace())
         .output()
         .expect("the command runs")
+}
+
+/// Runs the command against a server with this fault, with the profile in a file of a new directory.
+fn tested(fault: Option<Fault>, arguments: &str) -> (Output, TempDir) {
+    let directory = tempfile::tempdir().expect("a directory");
+    let path = directory.path().display();
+    std::fs::write(directory.path().join("profile.toml"), PROFILE).expect("written");
+    let address = server(fault);
+    let arguments = arguments.replace("DIR", &path.to_string());
+    let endpoint = format!("--tcp {address} --profile {path}/profile.toml --patience 60");
+    (command(&format!("{endpoint} {arguments}")), directory)
 }
 
 fn text(bytes: &[u8]) -> String {
@@ -105,28 +101,9 @@ fn server(fault: Option<Fault>) -> String {
 
 #[test]
 fn good_server_passes_and_the_reports_are_written() {
-    let directory = tempfile::tempdir().expect("a directory");
-    let path = |name: &str| directory.path().join(name).display().to_string();
-    std::fs::write(path("profile.toml"), PROFILE).expect("written");
-    let output = command(&[
-        "--tcp",
-        &server(None),
-        "--profile",
-        &path("profile.toml"),
-        "--patience",
-        "60",
-        "--only",
-        "fc05/",
-        "--only",
-        "timing/",
-        "--exclude",
-        "fc05/length",
-        "--trace",
-        "--junit",
-        &path("junit.xml"),
-        "--json",
-        &path("result.json"),
-    ]);
+    let arguments = "--only fc05/ --only timing/ --exclude fc05/length --trace \
+        --junit DIR/junit.xml --json DIR/result.json";
+    let (output, directory) = tested(None, arguments);
     let (out, err) = (text(&output.stdout), text(&output.stderr));
     assert_eq!(output.status.code(), Some(0), "{out}{err}");
     assert!(
@@ -140,29 +117,17 @@ fn good_server_passes_and_the_reports_are_written() {
         traced(" s sent     09 05 ") && traced(" s received 09 05 "),
         "{err}"
     );
-    let xml = std::fs::read_to_string(path("junit.xml")).expect("there");
+    let read = |name: &str| std::fs::read_to_string(directory.path().join(name)).expect("there");
+    let xml = read("junit.xml");
     assert!(xml.contains("failures=\"0\"") && xml.contains("classname=\"fc05\""));
-    let json = std::fs::read_to_string(path("result.json")).expect("there");
-    let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+    let json: serde_json::Value = serde_json::from_str(&read("result.json")).expect("JSON");
     assert_eq!(json["failed"], 0);
     assert!(json["passed"].as_u64() > Some(3));
 }
 
 #[test]
 fn faulty_server_gives_status_1_and_its_failure_is_printed() {
-    let directory = tempfile::tempdir().expect("a directory");
-    let profile = directory.path().join("profile.toml");
-    std::fs::write(&profile, PROFILE).expect("written");
-    let output = command(&[
-        "--tcp",
-        &server(Some(Fault::Answers126)),
-        "--profile",
-        &profile.display().to_string(),
-        "--patience",
-        "60",
-        "--only",
-        "fc03/quantity-above-most",
-    ]);
+    let (output, _) = tested(Some(Fault::Answers126), "--only fc03/quantity-above-most");
     let out = text(&output.stdout);
     assert_eq!(output.status.code(), Some(1), "{out}");
     for part in [
@@ -182,34 +147,21 @@ fn run_that_cannot_test_gives_status_2_and_one_line() {
     drop(nobody);
     let silent = server(Some(Fault::SilentToUnknown));
     for (arguments, part) in [
-        (&[][..], "--serial PORT"),
-        (&["--tcp", &nowhere], "cannot connect"),
-        (&["--serial", "/dev/no-such-port"], "there is no port"),
-        (
-            &["--tcp", &silent, "--unit", "77", "--patience", "50"],
-            "does not answer",
-        ),
-        (
-            &["--tcp", &silent, "--unit", "9", "--patience", "50"],
-            "--profile",
-        ),
-        (
-            &["--tcp", &silent, "--profile", "/no/profile"],
-            "/no/profile",
-        ),
-        (
-            &["--tcp", &nowhere, "--json", "/no/report"],
-            "cannot write /no/report",
-        ),
-        (
-            &["--tcp", &nowhere, "--json", "x", "--junit", "x"],
-            "the same file",
-        ),
-        (&["--only", "no such case"], "--list"),
-        (&["--format", "9N1"], "8N2"),
-        (&["--no-such-option"], "unexpected argument"),
+        ("", "--serial PORT"),
+        ("--tcp NOWHERE", "cannot connect"),
+        ("--serial /dev/no-such-port", "there is no port"),
+        ("--tcp SILENT --unit 77 --patience 50", "does not answer"),
+        ("--tcp SILENT --unit 9 --patience 50", "--profile"),
+        ("--tcp SILENT --profile /no/profile", "/no/profile"),
+        ("--tcp NOWHERE --json /no/report", "cannot write /no/report"),
+        ("--tcp NOWHERE --json x --junit x", "the same file"),
+        ("--only no-such-case", "--list"),
+        ("--format 9N1", "8N2"),
+        ("--no-such-option", "unexpected argument"),
     ] {
-        let output = command(arguments);
+        let arguments = arguments.replace("NOWHERE", &nowhere);
+        let arguments = arguments.replace("SILENT", &silent);
+        let output = command(&arguments);
         let err = text(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {err}");
         assert!(err.contains(part), "{arguments:?}: {err}");
@@ -219,33 +171,20 @@ fn run_that_cannot_test_gives_status_2_and_one_line() {
 
 #[test]
 fn failed_interpretation_gives_status_1_only_with_strict() {
-    let directory = tempfile::tempdir().expect("a directory");
-    let profile = directory.path().join("profile.toml");
-    std::fs::write(&profile, PROFILE).expect("written");
-    for (option, status) in [(None, 0), (Some("--strict"), 1)] {
-        let address = server(Some(Fault::IgnoresSpareBytes));
-        let profile = profile.display().to_string();
-        let mut arguments = vec![
-            "--tcp",
-            &address,
-            "--profile",
-            &profile,
-            "--patience",
-            "60",
-            "--only",
-            "fc05/length",
-        ];
-        arguments.extend(option);
-        let output = command(&arguments);
+    for (arguments, status) in [
+        ("--only fc05/length", 0),
+        ("--only fc05/length --strict", 1),
+    ] {
+        let (output, _) = tested(Some(Fault::IgnoresSpareBytes), arguments);
         let out = text(&output.stdout);
-        assert_eq!(output.status.code(), Some(status), "{option:?}: {out}");
+        assert_eq!(output.status.code(), Some(status), "{arguments}: {out}");
         assert!(out.contains("failed interpretations: 1"), "{out}");
     }
 }
 
 #[test]
 fn list_names_every_case() {
-    let output = command(&["--list"]);
+    let output = command("--list");
     assert_eq!(output.status.code(), Some(0));
     let list = text(&output.stdout);
     for case in conformance::cases::all() {
