@@ -6,12 +6,6 @@ use sim::{Board, Config, Image};
 use super::bench::Bench;
 use super::unit::Unit;
 
-/// Part of the message about an address in use. The text of Windows depends on its language.
-pub const IN_USE: &str = if cfg!(windows) {
-    "(os error 10048)"
-} else {
-    "in use"
-};
 /// Part of the message about a missing directory.
 pub const NO_DIRECTORY: &str = if cfg!(windows) {
     "(os error 3)"

@@ -5,7 +5,7 @@ use std::net::TcpStream;
 
 use modbus_line::adu::Framing;
 
-use super::{IN_USE, Running, connect, endless_loop, eventually, refused, state};
+use super::{Running, connect, eventually, state};
 
 const READ: &[u8] = &[3, 2, 0, 0, 1];
 
@@ -193,17 +193,6 @@ fn halted_core_is_exception_0a_until_the_debugger_leaves() {
     eventually("the core is still halted", || {
         client.ask(1, READ) == [0x83, 0x0B]
     });
-}
-
-#[test]
-fn port_in_use_is_refused() {
-    let directory = tempfile::tempdir().unwrap();
-    let elf = endless_loop(directory.path());
-    let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
-    let address = taken.local_addr().unwrap().to_string();
-    let arguments = ["--http", "127.0.0.1:0", "--modbus-tcp", &address];
-    let arguments = [&["--elf", elf.to_str().unwrap()][..], &arguments].concat();
-    refused(&arguments, &["Modbus TCP", &address, IN_USE]);
 }
 
 /// Returns a simulator that runs the image.

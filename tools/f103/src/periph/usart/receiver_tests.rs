@@ -117,17 +117,6 @@ fn a_pulse_between_two_samples_is_not_seen() {
 }
 
 #[test]
-fn with_two_stop_bits_rxne_rises_at_the_end_of_the_first() {
-    let mut usart = receiver(0, cr2::STOP_TWO);
-    play(
-        &mut usart,
-        Character::new(settings(Format::N2), 0).at(START),
-    );
-    usart.advance(START);
-    assert_eq!(usart.next_event(), Some(SAMPLED + cycles(10 * 625)));
-}
-
-#[test]
 fn overrun_keeps_the_first_byte_and_is_cleared_by_reading_sr_then_dr() {
     let mut usart = receiver(cr1::RXNEIE, 0);
     let c = |byte, n: u64| {
@@ -240,21 +229,6 @@ fn receiver_enabled_in_mid_character_waits_for_the_next_edge() {
     usart.advance(on);
     usart.write(offset::CR1, ON, on).expect("modelled");
     assert_eq!(status(&mut usart, on + Time::from_ms(1)) & sr::RXNE, 0);
-}
-
-#[test]
-fn a_wrong_rate_gives_wrong_bytes() {
-    let mut usart = receiver(0, 0);
-    let slow = Settings {
-        baud: 57_600,
-        format: Format::N1,
-    };
-    // Each bit at 57600 is two here: 0 0, 0 0, 1 1, 1 1, 0 0, ... The first is the start bit, eight are
-    // data, and the second half of the fourth data bit stands where the stop bit should.
-    play(&mut usart, Character::new(slow, 0b0011_0110).at(START));
-    let first = SAMPLED + Rate::from_clock(BRR, HZ).sixteenths(9 * 16 + 10);
-    assert_eq!(status(&mut usart, first), sr::RESET | sr::RXNE | sr::FE);
-    assert_eq!(data(&mut usart, first), 0b0111_1000);
 }
 
 #[test]

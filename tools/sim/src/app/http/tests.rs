@@ -7,7 +7,6 @@ use std::sync::mpsc;
 use serde_json::json;
 
 use super::*;
-use crate::app::testing::IN_USE;
 
 fn server() -> (SocketAddr, broadcast::Sender<Note>) {
     server_with(connections::PATIENCE)
@@ -318,13 +317,4 @@ fn stopping_simulator_answers_with_503() {
     let address = listen("127.0.0.1:0".parse().unwrap(), mpsc::channel().0, live).unwrap();
     let answer = read_state(address);
     assert!(answer.starts_with("HTTP/1.1 503"), "{answer}");
-}
-
-#[test]
-fn port_in_use_is_an_error_that_names_the_option() {
-    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
-    let address = taken.local_addr().unwrap();
-    let live = broadcast::Sender::new(1);
-    let text = listen(address, mpsc::channel().0, live).unwrap_err();
-    assert!(text.contains(IN_USE) && text.contains("--http"), "{text}");
 }
