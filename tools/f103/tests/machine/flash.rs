@@ -6,7 +6,7 @@ use f103::periph::flash::{Durations, Torn};
 
 use super::asm::{Asm, When};
 use super::regs::*;
-use super::{chip, chip_with, findings, out};
+use super::{chip_with, findings, out};
 
 /// Address of the page that the programs use: the last but one.
 const PAGE: u32 = 0x0801_F800;
