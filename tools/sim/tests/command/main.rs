@@ -57,11 +57,9 @@ fn signals_end_the_simulator_with_success_and_remove_the_link() {
     let elf = endless_loop(directory.path());
     for signal in ["-INT", "-TERM"] {
         let link = directory.path().join("line");
-        let mut arguments = vec!["--elf", elf.to_str().unwrap(), "--http", "127.0.0.1:0"];
-        if sim::options::PTY {
-            arguments.extend(["--pty", link.to_str().unwrap()]);
-        }
-        let mut running = Running::start(&arguments);
+        let pty = ["--pty", link.to_str().unwrap()];
+        let more = if sim::options::PTY { &pty[..] } else { &[] };
+        let mut running = Running::start_image(elf.to_str().unwrap(), more);
         let pty = running.line();
         if sim::options::PTY {
             assert_eq!(fs::read_link(&link).unwrap(), std::path::Path::new(&pty));
@@ -183,10 +181,9 @@ fn assert_preset(board: &[&str], fitting: &[&str], name: &str, settings: &[(u16,
     let elf = endless_loop(directory.path());
     let flash = directory.path().join("flash");
     let run = |more: &[&str]| {
-        let mut arguments = vec!["--elf", elf.to_str().unwrap(), "--for", "10ms"];
-        arguments.extend(["--http", "127.0.0.1:0", "--flash", flash.to_str().unwrap()]);
-        arguments.extend(board.iter().chain(more));
-        let mut running = Running::start(&arguments);
+        let first = ["--for", "10ms", "--flash", flash.to_str().unwrap()];
+        let all = [&first[..], board, more].concat();
+        let mut running = Running::start_image(elf.to_str().unwrap(), &all);
         assert_eq!(running.end(), (Some(0), String::new()));
         fs::read(&flash).unwrap()
     };
