@@ -13,7 +13,7 @@ fn cycles(n: u64) -> Time {
 }
 
 fn receiver(cr1: u32, cr2: u32) -> Usart {
-    let mut usart = Usart::new();
+    let mut usart = Usart::default();
     usart.set_clock(HZ, Time::ZERO);
     for (offset, value) in [
         (offset::BRR, BRR),
