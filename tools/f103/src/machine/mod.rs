@@ -182,10 +182,7 @@ impl<C: Circuit> Chip<C> {
             ram_code,
             core_is_used: used,
             debugged: false,
-            symbols: image
-                .symbols()
-                .map(|(name, address)| (name.to_owned(), address))
-                .collect(),
+            symbols: image.symbols.clone(),
         };
         chip.bus.soc.refresh(Time::ZERO);
         chip.power_on();
