@@ -122,16 +122,9 @@ fn read(client: &Arc<Client>, events: &Sender<Event>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::app::testing::eventually;
     use std::net::TcpStream;
-    use std::time::{Duration, Instant};
-
-    fn eventually(what: &str, mut is: impl FnMut() -> bool) {
-        let end = Instant::now() + Duration::from_secs(20);
-        while !is() {
-            assert!(Instant::now() < end, "{what}");
-            thread::sleep(Duration::from_millis(2));
-        }
-    }
+    use std::time::Duration;
 
     #[test]
     fn bytes_of_a_client_are_an_event_and_clients_receive_all_bytes_except_their_own() {
