@@ -1,4 +1,4 @@
-//! The machine: the Cortex-M3 core with its memories, on the bus with everything else.
+//! The machine: the Cortex-M3 core with its memories, on the bus with everything else, and the part's power.
 //!
 //! The core is crate rigless's: it translates the firmware's instructions to host code and counts them. Its
 //! time is [`timing`]'s, by the [`costs`] of the [`segment`]s of code that [`execute`] lets it run; its bus is
