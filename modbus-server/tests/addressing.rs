@@ -50,35 +50,6 @@ fn the_highest_address_works_like_any_other() {
 }
 
 #[test]
-fn replies_of_other_units_are_never_treated_as_requests() {
-    let mut unit = unit();
-    let points = unit.points.clone();
-    for reply in [
-        vec![0x03, 0x02, 0x12, 0x34],
-        pdu(0x06, &[0, 1]),
-        pdu(0x10, &[0, 2]),
-        vec![0x83, 0x02],
-    ] {
-        for other in [1, 16, 18, 247] {
-            unit.raw(&frame(other, &pdu(0x03, &[0, 1])));
-            assert_eq!(unit.raw(&frame(other, &reply)), None);
-            unit.must_answer();
-        }
-    }
-    assert_eq!(unit.points, points);
-}
-
-#[test]
-fn damaged_traffic_of_other_units_is_ignored_and_the_next_request_answered() {
-    let mut unit = unit();
-    let theirs = frame(UNIT + 1, &write_words(0, &[0x1234; 60]));
-    for len in 1..theirs.len() {
-        assert_eq!(unit.raw(&theirs[..len]), None);
-        unit.must_answer();
-    }
-}
-
-#[test]
 fn a_set_of_units_is_served_under_each_of_its_addresses() {
     const UNITS: UnitSet = UnitSet::new(&[1, 17, 255]);
     let mut adus = [Adu::new(), Adu::new()];

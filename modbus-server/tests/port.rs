@@ -1,5 +1,8 @@
 //! A port and its server: start and end of a reply, and the use of the buffers.
 
+mod common;
+
+use common::{UNIT, send};
 use modbus_server::line::{Faults, Framing, Port, Receiver, Width};
 use modbus_server::{Adu, Counters, Outcome, Server, Tables};
 
@@ -16,7 +19,6 @@ impl Registers {
     }
 }
 
-const UNIT: u8 = 17;
 const READ: [u8; 8] = [0x11, 0x03, 0x00, 0x04, 0x00, 0x01, 0xC7, 0x5B];
 const REPLY: [u8; 7] = [0x11, 0x03, 0x02, 0x11, 0x11, 0xB5, 0xDB];
 /// A valid frame for another unit: unit 18 reads a register.
@@ -70,16 +72,7 @@ impl<'a> Unit<'a> {
 
     /// Returns the bytes of a reply that may start, and ends the reply.
     fn sends(&mut self) -> Vec<u8> {
-        let mut sent: Vec<u8> = self.port.start().into_iter().collect();
-        if sent.is_empty() {
-            return sent;
-        }
-        assert!(self.port.is_sending());
-        while let Some(byte) = self.port.next_byte() {
-            sent.push(byte);
-        }
-        self.port.sent();
-        sent
+        send(&mut self.port).unwrap_or_default()
     }
 
     fn counters(&self) -> Counters {
@@ -274,11 +267,7 @@ fn an_ascii_request_is_served_at_the_short_silence_and_too_late_at_the_long_one(
             assert!(port.short_silence(0));
             let request = port.take().expect("a request waits");
             port.send(server.serve(request, &mut registers.tables()), 0);
-            let mut sent = vec![port.start().expect("the request is answered")];
-            while let Some(byte) = port.next_byte() {
-                sent.push(byte);
-            }
-            port.sent();
+            let sent = send(&mut port).expect("the request is answered");
             assert_eq!(sent, b":1103021111C8\r\n");
         }
     }

@@ -155,6 +155,16 @@ impl MockFlash {
         }
     }
 
+    /// Ends an operation on a page.
+    fn ended(&mut self, index: usize) -> Result<(), Fault> {
+        self.read_otherwise(index);
+        if self.off {
+            Err(Fault::PowerCut)
+        } else {
+            Ok(())
+        }
+    }
+
     /// Updates what every second read finds on a page.
     fn read_otherwise(&mut self, page: usize) {
         self.other[page] = self.pages[page];
@@ -262,12 +272,7 @@ impl Pages for MockFlash {
                 mess,
             });
         }
-        self.read_otherwise(index);
-        if self.off {
-            Err(Fault::PowerCut)
-        } else {
-            Ok(())
-        }
+        self.ended(index)
     }
 
     fn erase(&mut self, page: Page) -> Result<(), Fault> {
@@ -294,12 +299,7 @@ impl Pages for MockFlash {
                 bytes.fill_with(|| noise.next() as u8);
             }
         }
-        self.read_otherwise(index);
-        if self.off {
-            Err(Fault::PowerCut)
-        } else {
-            Ok(())
-        }
+        self.ended(index)
     }
 }
 

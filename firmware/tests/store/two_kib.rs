@@ -2,7 +2,6 @@
 
 mod cuts;
 mod flash;
-mod model;
 mod running;
 mod vectors;
 mod wear;

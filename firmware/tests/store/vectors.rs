@@ -66,6 +66,15 @@ const LATER: [u8; 44] = [
     0xFF, 0xFF, 0xFF, 0xFF,
 ];
 
+/// The settings of the newest record in [`VERSION_0_1`] and [`SEALED`].
+const STORED: [(u16, u16); 5] = [
+    (0x0101, 192),
+    (0x0106, 1000),
+    (0x0114, 6),
+    (0x0162, 3440),
+    (0x01D2, 0xFFFF),
+];
+
 fn page(bytes: &[u8]) -> [u8; PAGE_SIZE] {
     let mut page = [0xFF; PAGE_SIZE];
     page[..bytes.len()].copy_from_slice(bytes);
@@ -74,13 +83,7 @@ fn page(bytes: &[u8]) -> [u8; PAGE_SIZE] {
 
 #[test]
 fn the_newest_record_of_version_0_1_is_read_on_either_page() {
-    let expected = settings(&[
-        (0x0101, 192),
-        (0x0106, 1000),
-        (0x0114, 6),
-        (0x0162, 3440),
-        (0x01D2, 0xFFFF),
-    ]);
+    let expected = settings(&STORED);
     for mut flash in [
         MockFlash::with(&VERSION_0_1, &[]),
         MockFlash::with(&[], &VERSION_0_1),
@@ -168,13 +171,7 @@ fn a_preset_is_read_as_a_stored_configuration() {
 fn what_is_stored_is_the_documented_record() {
     let mut flash = MockFlash::with(&SEALED[..32], &[]);
     let (_, mut store) = start_well(&mut flash);
-    let settings = settings(&[
-        (0x0101, 192),
-        (0x0106, 1000),
-        (0x0114, 6),
-        (0x0162, 3440),
-        (0x01D2, 0xFFFF),
-    ]);
+    let settings = settings(&STORED);
     let mut saving = Saving::new(&store, &flash, &settings).unwrap();
     while let Some(operation) = saving.next(&settings) {
         operation.perform(&mut flash).unwrap();

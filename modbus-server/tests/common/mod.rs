@@ -169,6 +169,7 @@ impl<'a, M: DataModel> UnitOn<'a, M> {
 /// Returns the characters of a reply that may start, and ends the reply.
 pub fn send(port: &mut Port<'_, impl Units>) -> Option<Vec<u8>> {
     let mut sent = vec![port.start()?];
+    assert!(port.is_sending());
     while let Some(byte) = port.next_byte() {
         sent.push(byte);
     }

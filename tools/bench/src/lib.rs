@@ -17,30 +17,19 @@ use serde::Serialize;
 use sim::{Corner, Image};
 
 use rival::Rival;
-use unit::Unit;
+use unit::{Cost, Unit};
 
 /// The baud rates of [`load`], in units of 100 bit/s.
 const RATES: [u16; 3] = [96, 1152, 9216];
 
-/// Cost of a request, in instructions.
+/// Cost of a request.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
     /// The function and its parameters.
     pub request: String,
-    /// From the end of t3.5 to the first byte of the response in the UART's data register.
-    pub to_first_byte: u32,
-    /// The three interrupt handlers of the line, from the request's first byte until the driver is off.
-    pub transaction: u32,
-    /// The instructions of `transaction`, by address.
-    pub addresses: BTreeMap<u32, u32>,
-    /// The longest handler for a byte received.
-    pub byte_in: u32,
-    /// The longest handler for a byte sent.
-    pub byte_out: u32,
-    /// The handler at the end of the reply, which switches the driver off.
-    pub reply_end: u32,
-    /// Longest time for which the request holds off the scan, in cycles of the core.
-    pub scan_held: u32,
+    /// The cost on the image.
+    #[serde(flatten)]
+    pub cost: Cost,
     /// What is allowed for some of these figures in this row, by their names.
     pub budgets: BTreeMap<&'static str, u32>,
     /// Cost on each rival, from complete frame to complete response; `None` when the rival does not answer.
@@ -92,13 +81,7 @@ pub fn measure(image: &Image, board: &Board, rivals: &[(String, Image)]) -> Resu
         requests.push(Row {
             budgets: request.budgets(),
             request: request.name,
-            to_first_byte: cost.to_first_byte,
-            transaction: cost.transaction,
-            addresses: cost.addresses,
-            byte_in: cost.byte_in,
-            byte_out: cost.byte_out,
-            reply_end: cost.reply_end,
-            scan_held: cost.scan_held,
+            cost,
             rivals: others,
         });
     }

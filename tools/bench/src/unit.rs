@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use register_map::codes::Mode;
 use register_map::{Board as Map, Module, configuration};
+use serde::Serialize;
 use sim::board::Layout;
 use sim::line::{Format, Settings, frame_silence};
 use sim::{Board, Config, Corner, Image, Time};
@@ -36,7 +37,7 @@ const PAUSE: Time = Time::from_us(137);
 const TOO_MANY: u32 = 1_000_000;
 
 /// Cost of one request, in instructions.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Cost {
     /// From the end of t3.5 to the first byte of the response in the UART's data register.
     pub to_first_byte: u32,
@@ -50,7 +51,7 @@ pub struct Cost {
     pub byte_out: u32,
     /// The handler at the end of the reply, which switches the driver off.
     pub reply_end: u32,
-    /// Longest time without a chance for the scan to run, in cycles of the core.
+    /// Longest time for which the request holds off the scan, in cycles of the core.
     pub scan_held: u32,
 }
 

@@ -16,7 +16,7 @@ const LARGEST_FLASH: usize = 1024 * 1024;
 pub struct Image {
     /// Where each run of bytes goes (offset into flash), and the bytes.
     segments: Vec<(usize, Vec<u8>)>,
-    symbols: BTreeMap<String, u32>,
+    pub(crate) symbols: BTreeMap<String, u32>,
     entry: u32,
 }
 
@@ -105,13 +105,6 @@ impl Image {
     #[must_use]
     pub fn symbol(&self, name: &str) -> Option<u32> {
         self.symbols.get(name).copied()
-    }
-
-    /// Returns every symbol, by name.
-    pub fn symbols(&self) -> impl Iterator<Item = (&str, u32)> {
-        self.symbols
-            .iter()
-            .map(|(name, &address)| (name.as_str(), address))
     }
 
     /// Returns how many bytes of flash it fills.

@@ -7,7 +7,7 @@
 //!
 //! ```text
 //! chip       the part as its user sees it        serial characters on a wire, and how they are sampled
-//! machine    core, memories, run loop            periph one register block of the part in each file
+//! machine    core, memories, power, run loop     periph one register block of the part in each file
 //! soc        register blocks, clocks, pins       part   flash, SRAM, pins and identity of each part
 //! corner     how a part may differ from another  image  a firmware image from its ELF file
 //! ```

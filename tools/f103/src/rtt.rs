@@ -50,12 +50,6 @@ impl Log {
         }
     }
 
-    /// Returns whether there is anything to poll.
-    #[must_use]
-    pub fn is_present(&self) -> bool {
-        self.block.is_some()
-    }
-
     /// Empties the firmware's buffer, as a probe does.
     pub fn poll(&mut self, ram: &mut [u8]) {
         if let Some(unread) = self.unread(ram) {

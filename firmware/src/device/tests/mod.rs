@@ -10,7 +10,7 @@ mod state;
 use std::vec::Vec;
 
 use modbus_server::line::{Faults, Framing, Port, Receiver};
-use modbus_server::{Adu, Server};
+use modbus_server::{Adu, Server, crc};
 use modio_drivers::ChannelStatus;
 use modio_drivers::{Kind, Scale};
 use register_map::board::{MODIO_02, MODIO_08};
@@ -23,19 +23,6 @@ use crate::config::Settings;
 struct Bench<const SLOTS: usize = 1> {
     device: Device<SLOTS>,
     server: Server,
-}
-
-/// CRC-16/MODBUS (V1.02 6.2.2), low byte first.
-fn crc(bytes: &[u8]) -> [u8; 2] {
-    let mut register = 0xFFFF;
-    for byte in bytes {
-        register ^= u16::from(*byte);
-        for _ in 0..8 {
-            let carry = register & 1;
-            register = (register >> 1) ^ (carry * 0xA001);
-        }
-    }
-    register.to_le_bytes()
 }
 
 impl Bench {
@@ -78,8 +65,9 @@ impl<const SLOTS: usize> Bench<SLOTS> {
         let mut port = Port::new(Receiver::rtu(1, false), &mut adus);
         port.long_silence(0);
         let body = [&[1], pdu].concat();
-        for byte in body.iter().chain(&crc(&body)) {
-            port.received(*byte, Faults::NONE);
+        let crc = body.iter().fold(crc::START, |crc, b| crc::step(crc, *b));
+        for byte in body.into_iter().chain(crc.to_le_bytes()) {
+            port.received(byte, Faults::NONE);
         }
         assert!(port.long_silence(0));
         let request = port.take().expect("a request waits");

@@ -8,15 +8,10 @@ use crate::soc::Circuit;
 use crate::soc::map::Block;
 
 impl<C: Circuit> Chip<C> {
-    /// Returns the text that the firmware has logged over RTT since the last call.
-    pub fn take_log(&mut self) -> String {
-        self.machine.take_log()
-    }
-
     /// Returns the contents of the flash.
     #[must_use]
     pub fn flash(&self) -> &[u8] {
-        self.machine.bus.soc.flash.bytes()
+        self.bus.soc.flash.bytes()
     }
 
     /// Returns the contents of the flash, for changing them.
@@ -28,7 +23,8 @@ impl<C: Circuit> Chip<C> {
         if self.powered() {
             return Err(Error::Powered);
         }
-        Ok(self.machine.flash_mut())
+        let flash = self.flash_range_mut(0..self.flash().len());
+        Ok(flash.unwrap_or_default())
     }
 
     /// Overwrites code in flash or SRAM while the part runs, to break the program on purpose. This is not a flash
@@ -43,9 +39,9 @@ impl<C: Circuit> Chip<C> {
             Some(at..at.saturating_add(bytes.len()))
         };
         let place = if address >= RAM_BASE {
-            range(RAM_BASE).and_then(|range| self.machine.ram_mut().get_mut(range))
+            range(RAM_BASE).and_then(|range| self.ram_mut().get_mut(range))
         } else {
-            range(FLASH_BASE).and_then(|range| self.machine.flash_range_mut(range))
+            range(FLASH_BASE).and_then(|range| self.flash_range_mut(range))
         };
         let place = place.ok_or(Error::Range("all bytes must be in flash or in SRAM"))?;
         let before = place.to_vec();
@@ -57,7 +53,7 @@ impl<C: Circuit> Chip<C> {
     /// as by a store of the core, but without the checks of the bus.
     pub fn upset(&mut self, block: Block, offset: u32, mask: u32) {
         let now = self.now();
-        let soc = &mut self.machine.bus.soc;
+        let soc = &mut self.bus.soc;
         soc.sync(now);
         // A register that is not modelled stays as it is.
         if let Ok(value) = soc.read(block, offset, now) {
@@ -69,39 +65,28 @@ impl<C: Circuit> Chip<C> {
     /// or after [`flash_mut`](Self::flash_mut) and [`patch_code`](Self::patch_code).
     #[must_use]
     pub fn flash_changes(&self) -> u64 {
-        self.machine.bus.soc.flash.changes().get()
+        self.bus.soc.flash.changes().get()
     }
 
     /// Returns the number of flash operations that were started since the chip was made.
     #[must_use]
     pub fn flash_operations(&self) -> u64 {
-        self.machine.bus.soc.flash.started()
+        self.bus.soc.flash.started()
     }
 
     /// Sets the durations of flash operations from now on.
     pub fn set_flash_durations(&mut self, durations: Durations) {
-        self.machine.bus.soc.flash.durations = durations;
+        self.bus.soc.flash.durations = durations;
     }
 
     /// Lets the `nth` flash operation from now (1 = the next) end without setting the flag EOP.
     pub fn end_without_eop(&mut self, nth: u64) {
-        self.machine.bus.soc.flash.end_without_eop(nth);
+        self.bus.soc.flash.end_without_eop(nth);
     }
 
     /// Sets the state of cells after a power cut in the middle of a flash operation, from now on.
     pub fn set_torn(&mut self, torn: Torn) {
-        self.machine.bus.soc.flash.torn = torn;
-    }
-
-    /// Returns the contents of the SRAM.
-    #[must_use]
-    pub fn ram(&self) -> &[u8] {
-        self.machine.ram()
-    }
-
-    /// Returns the contents of the SRAM, for changing them as with a debug probe.
-    pub fn ram_mut(&mut self) -> &mut [u8] {
-        self.machine.ram_mut()
+        self.bus.soc.flash.torn = torn;
     }
 
     /// Returns the word at `address` in flash or SRAM; `None` at any other address.
@@ -115,46 +100,15 @@ impl<C: Circuit> Chip<C> {
         read(self.ram(), RAM_BASE).or_else(|| read(self.flash(), FLASH_BASE))
     }
 
-    /// Returns the address of a symbol of the image. The address of a function has bit 0 set (Thumb).
-    #[must_use]
-    pub fn symbol(&self, name: &str) -> Option<u32> {
-        self.symbols.get(name).copied()
-    }
-
     /// Actions of the firmware since the chip was made that a real part does not allow or the simulator does not model.
     #[must_use]
     pub fn findings(&self) -> &[Finding] {
-        self.machine.bus.findings.as_slice()
-    }
-
-    /// Returns whether the core has locked up. Only a reset ends this state.
-    #[must_use]
-    pub fn locked_up(&self) -> bool {
-        self.machine.locked_up()
-    }
-
-    /// Returns whether the core waits in WFI or WFE.
-    #[must_use]
-    pub fn asleep(&self) -> bool {
-        self.machine.asleep()
-    }
-
-    /// Returns the address of the next instruction.
-    #[must_use]
-    pub fn pc(&self) -> u32 {
-        self.machine.pc()
-    }
-
-    /// Returns the value of a core register: 0 to 12 are R0 to R12, 13 SP, 14 LR, 15 PC, 16 xPSR, 17 MSP, 18 PSP, 19
-    /// PRIMASK, 20 BASEPRI, 21 FAULTMASK, 22 CONTROL; `None` for any other number.
-    #[must_use]
-    pub fn register(&self, number: usize) -> Option<u32> {
-        self.machine.register(number)
+        self.bus.findings.as_slice()
     }
 
     /// Returns the frequency of HCLK in Hz. SysTick and DWT count its cycles.
     #[must_use]
     pub fn hclk(&self) -> u32 {
-        self.machine.bus.soc.rcc.clocks().hclk
+        self.bus.soc.rcc.clocks().hclk
     }
 }

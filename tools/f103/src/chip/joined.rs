@@ -11,45 +11,38 @@ impl<C: Circuit> Chip<C> {
     /// Returns USART1 as of the last instruction: what it sends next, and when.
     #[must_use]
     pub const fn usart1(&self) -> &Usart {
-        self.machine.bus.soc.usart1()
+        self.bus.soc.usart1()
     }
 
     /// Returns the circuit, for changes that the part sees only at an RX pin, or not at all. Call
     /// [`wires_changed`](Self::wires_changed) after a change of the next edges at an RX pin, and [`sync`](Self::sync)
     /// before reading what the circuit has recorded.
     pub const fn circuit_mut(&mut self) -> &mut C {
-        &mut self.machine.bus.soc.circuit
+        &mut self.bus.soc.circuit
     }
 
     /// Takes over a change of the next edges at an RX pin.
     pub fn wires_changed(&mut self) {
-        self.machine.bus.soc.wires_changed();
+        self.bus.soc.wires_changed();
     }
 
     /// Takes over all changes that were made to the circuit.
     pub fn refresh(&mut self) {
         let now = self.now();
-        self.machine.bus.soc.refresh(now);
+        self.bus.soc.refresh(now);
     }
 
     /// Computes everything that is computed on demand up to the present.
     pub fn sync(&mut self) {
         let now = self.now();
-        self.machine.bus.soc.sync(now);
+        self.bus.soc.sync(now);
     }
 
     /// Runs as [`Chip::run_until`], but neither takes over changes of the circuit before nor computes what is computed
     /// on demand after it.
     pub fn run_ahead(&mut self, t: Time) {
         if self.now() < t {
-            self.machine.run(Limit::until(t));
+            self.run_core(Limit::until(t));
         }
-    }
-
-    /// Returns the instant before which the core executes nothing, as far as is known: [`Time::MAX`] if it sleeps and
-    /// no event is due.
-    #[must_use]
-    pub fn next_instruction(&self) -> Time {
-        self.machine.next_instruction()
     }
 }

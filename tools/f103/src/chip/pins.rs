@@ -9,20 +9,20 @@ impl<C: Circuit> Chip<C> {
     /// Returns whether the 8 MHz crystal works.
     #[must_use]
     pub fn crystal(&self) -> bool {
-        self.machine.bus.soc.rcc.crystal()
+        self.bus.soc.rcc.crystal()
     }
 
     /// Lets the crystal fail at this instant, or work again. A crystal that works again starts if RCC has it on.
     pub fn set_crystal(&mut self, works: bool) {
         self.sync();
         let now = self.now();
-        self.machine.bus.soc.set_crystal(works, now);
+        self.bus.soc.set_crystal(works, now);
     }
 
     /// Returns the frequencies of HSI and LSI in Hz.
     #[must_use]
     pub fn rc_oscillators(&self) -> (u32, u32) {
-        let oscillators = self.machine.bus.soc.rcc.oscillators();
+        let oscillators = self.bus.soc.rcc.oscillators();
         (oscillators.hsi, oscillators.lsi)
     }
 
@@ -43,14 +43,14 @@ impl<C: Circuit> Chip<C> {
         }
         self.sync();
         let now = self.now();
-        self.machine.bus.soc.set_rc_oscillators(hsi, lsi, now);
+        self.bus.soc.set_rc_oscillators(hsi, lsi, now);
         Ok(())
     }
 
     /// Returns the supply voltage of the part, in mV.
     #[must_use]
     pub fn supply_mv(&self) -> u16 {
-        self.machine.bus.soc.pwr.supply_mv()
+        self.bus.soc.pwr.supply_mv()
     }
 
     /// Sets the supply voltage of the part, in mV. It stays the same in a power cycle.
@@ -64,7 +64,7 @@ impl<C: Circuit> Chip<C> {
             return Err(Error::Range("the supply must be 2000 to 3600 mV"));
         }
         self.sync();
-        self.machine.bus.soc.pwr.set_supply_mv(millivolts);
+        self.bus.soc.pwr.set_supply_mv(millivolts);
         Ok(())
     }
 
@@ -73,7 +73,7 @@ impl<C: Circuit> Chip<C> {
     pub fn lock_i2c_filters(&mut self) {
         self.sync();
         let now = self.now();
-        self.machine.bus.soc.lock_i2c_filters(now);
+        self.bus.soc.lock_i2c_filters(now);
     }
 
     /// Disturbs the wires of I2C1 at this instant with a pulse that looks like a start condition. Returns whether this
@@ -81,7 +81,7 @@ impl<C: Circuit> Chip<C> {
     pub fn disturb_i2c(&mut self) -> bool {
         self.sync();
         let now = self.now();
-        self.machine.bus.soc.disturb_i2c(now)
+        self.bus.soc.disturb_i2c(now)
     }
 
     /// Returns the level of a pin, as a logic probe shows it: port `'A'` to `'D'`, pin 0 to 15. Low for a pin that does
@@ -102,7 +102,7 @@ impl<C: Circuit> Chip<C> {
     /// Records the edges of a pin from now on.
     pub fn watch_pin(&mut self, port: char, pin: u8) {
         if let Some(pin) = Pin::find(port, pin.into()) {
-            self.machine.bus.soc.gpio[pin.port_index()].watch(pin.number());
+            self.bus.soc.gpio[pin.port_index()].watch(pin.number());
         }
     }
 
@@ -116,6 +116,6 @@ impl<C: Circuit> Chip<C> {
     /// Returns the port of a pin, and the number of the pin in the port.
     fn look(&self, port: char, pin: u8) -> Option<(&Gpio, usize)> {
         let pin = Pin::find(port, pin.into())?;
-        Some((&self.machine.bus.soc.gpio[pin.port_index()], pin.number()))
+        Some((&self.bus.soc.gpio[pin.port_index()], pin.number()))
     }
 }

@@ -6,7 +6,7 @@ use rigless::time::VirtualNanos;
 
 use super::run::{IPSR, Limit, XPSR};
 use super::segment::{End, Place};
-use super::{FLASH_BASE, Machine, RAM_BASE};
+use super::{Chip, FLASH_BASE, RAM_BASE};
 use crate::soc::Circuit;
 use crate::time::Time;
 
@@ -22,7 +22,7 @@ pub(super) struct Active {
     handler: u32,
 }
 
-impl<C: Circuit> Machine<C> {
+impl<C: Circuit> Chip<C> {
     /// Lets the core run until the next event or limit, or until the core has to be looked at.
     pub(super) fn execute(&mut self, limit: Limit) -> Exit {
         let stop = limit

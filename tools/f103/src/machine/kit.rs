@@ -13,7 +13,7 @@ use rigless::emulator::{Processor, Queued};
 
 use super::memory::{FLASH_BASE, Memory, RAM_BASE, ROUTED_PAGE};
 use super::ram_code::RamCode;
-use super::{Machine, cortex};
+use super::{Chip, cortex};
 use crate::part::Part;
 use crate::periph::flash::Flash;
 
@@ -154,7 +154,7 @@ fn leave(kit: Kit) {
     }
 }
 
-impl<C> Drop for Machine<C> {
+impl<C> Drop for Chip<C> {
     fn drop(&mut self) {
         let Some(mut core) = self.core.0.take() else {
             return;

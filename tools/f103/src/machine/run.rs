@@ -8,7 +8,7 @@ use rigless::emulator::Exit;
 use rigless::soc::Width;
 use rigless::time::VirtualNanos;
 
-use super::Machine;
+use super::Chip;
 use crate::finding::What;
 use crate::machine::memory::RAM_BASE;
 use crate::machine::usage::Rest;
@@ -40,10 +40,10 @@ const GIVE_UP: Time = Time::from_secs(60);
 
 /// Conditions that end a run; the first that occurs ends it.
 #[derive(Clone, Copy, Debug)]
-pub struct Limit {
+pub(crate) struct Limit {
     /// At this instant.
     pub time: Time,
-    /// After this number of instructions, counted since the machine was created.
+    /// After this number of instructions, counted since the chip was made.
     pub instructions: u64,
     /// Before the instruction at this address.
     pub pc: Option<u32>,
@@ -63,22 +63,11 @@ impl Limit {
     }
 }
 
-/// Why a run ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stop {
-    /// The instant was reached.
-    Time,
-    /// The number of instructions was reached.
-    Instructions,
-    /// The instruction at the address is next.
-    Pc,
-    /// The power is off, or the core has executed nothing for a minute, in a run without a limit in time.
-    Stuck,
-}
-
-impl<C: Circuit> Machine<C> {
-    /// Runs up to `limit`. While the power is off, time passes for the circuit around the part.
-    pub fn run(&mut self, limit: Limit) -> Stop {
+impl<C: Circuit> Chip<C> {
+    /// Runs up to `limit`. Returns whether the run ended before the instruction at `limit.pc` or at a breakpoint. While
+    /// the power is off, time passes for the circuit around the part. A run without a limit in time also ends when the
+    /// power is off, or when the core has executed nothing for a minute.
+    pub(crate) fn run_core(&mut self, limit: Limit) -> bool {
         let address = limit.pc.map(|pc| u64::from(pc & !1));
         if let Some(address) = address {
             self.core.add_breakpoint(address);
@@ -95,7 +84,7 @@ impl<C: Circuit> Machine<C> {
         stop
     }
 
-    fn run_to(&mut self, limit: Limit) -> Stop {
+    fn run_to(&mut self, limit: Limit) -> bool {
         let mut patience = self.now() + GIVE_UP;
         loop {
             let now = self.now();
@@ -114,15 +103,15 @@ impl<C: Circuit> Machine<C> {
                 self.poll_at = POLL * (now.as_ps() / POLL.as_ps() + 1);
             }
             if now >= limit.time {
-                return Stop::Time;
+                return false;
             }
             if self.instructions() >= limit.instructions {
-                return Stop::Instructions;
+                return false;
             }
             self.look_at_waits(now);
             if let Some((end, why)) = self.idle_end(now) {
                 if !self.idle(end, why, limit, patience) {
-                    return Stop::Stuck;
+                    return false;
                 }
                 continue;
             }
@@ -130,14 +119,14 @@ impl<C: Circuit> Machine<C> {
                 Exit::Breakpoint => {
                     let pc = self.pc();
                     if limit.breakpoints || limit.pc.is_some_and(|wanted| wanted & !1 == pc) {
-                        return Stop::Pc;
+                        return true;
                     }
                     self.core.pass_breakpoint(u64::from(pc));
                 }
                 Exit::Waiting if self.bus.queued.is_empty() => {
                     self.check_sleep();
                     if !self.idle(Time::MAX, self.why_waiting(), limit, patience) {
-                        return Stop::Stuck;
+                        return false;
                     }
                     continue;
                 }
@@ -257,8 +246,9 @@ impl<C: Circuit> Machine<C> {
             .min(self.cut_at.unwrap_or(Time::MAX))
     }
 
-    /// Returns the earliest time at which the core may execute an instruction, unless something outside the machine
-    /// changes before; [`Time::MAX`] for never.
+    /// Returns the instant before which the core executes nothing, as far as is known: [`Time::MAX`] if it sleeps and
+    /// no event is due.
+    #[must_use]
     pub fn next_instruction(&self) -> Time {
         let now = self.now();
         let event = self.next_event();
@@ -333,7 +323,7 @@ impl<C: Circuit> Machine<C> {
         let asked = self.core.take_reset_request().then_some(Cause::Software);
         let cause = self.bus.soc.signals.reset.take().or(asked);
         if let Some(cause) = cause {
-            self.reset(cause);
+            self.reset_by(cause);
         }
         cause.is_some()
     }

@@ -5,7 +5,6 @@
 //! are lost. The start by 0xCCCC turns the LSI on (7.2.9). At the start and at each reload the counter uses the
 //! values of PR and RLR that are in effect at that moment.
 
-use crate::periph::clocks::Oscillators;
 use crate::peripheral::{Peripheral, Unmodelled};
 use crate::time::Time;
 
@@ -57,12 +56,6 @@ pub struct Iwdg {
     /// Instant at which the counter reaches 0 and requests a reset; `None` until it counts.
     reset_at: Option<Time>,
     reset_requested: bool,
-}
-
-impl Default for Iwdg {
-    fn default() -> Self {
-        Self::new(Oscillators::TYPICAL.lsi)
-    }
 }
 
 impl Iwdg {
@@ -183,6 +176,7 @@ impl Peripheral for Iwdg {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::periph::clocks::Oscillators;
 
     fn at(dog: &mut Iwdg, us: u64) -> Time {
         let now = Time::from_us(us);
@@ -192,7 +186,7 @@ mod tests {
 
     /// Returns a watchdog whose LSI runs from instant 0 and whose settings are unlocked.
     fn open() -> Iwdg {
-        let mut dog = Iwdg::default();
+        let mut dog = Iwdg::new(Oscillators::TYPICAL.lsi);
         dog.set_lsi(Some(Time::ZERO));
         dog.write(0, KEY_ACCESS, Time::ZERO).unwrap();
         dog
@@ -252,7 +246,7 @@ mod tests {
 
     #[test]
     fn settings_are_locked_without_their_key() {
-        let mut dog = Iwdg::default();
+        let mut dog = Iwdg::new(Oscillators::TYPICAL.lsi);
         dog.set_lsi(Some(Time::ZERO));
         assert!(dog.write(4, 1, Time::ZERO).is_err() && dog.write(8, 1, Time::ZERO).is_err());
         assert_eq!(dog.read(0x0C, Time::ZERO), Ok(0));
@@ -260,7 +254,7 @@ mod tests {
 
     #[test]
     fn without_the_lsi_pvu_and_rvu_stick_and_nothing_counts() {
-        let mut dog = Iwdg::default();
+        let mut dog = Iwdg::new(Oscillators::TYPICAL.lsi);
         dog.write(0, KEY_ACCESS, Time::ZERO).unwrap();
         dog.write(4, 2, Time::ZERO).unwrap();
         dog.write(8, 999, Time::ZERO).unwrap();

@@ -141,29 +141,48 @@ pub enum Widths {
     Any,
 }
 
+/// A block: its name in RM0008, the bus and the bit of [`Block::clock`], and the access widths with which the section of
+/// its registers in RM0008 begins.
+type Facts = (Block, &'static str, Option<(usize, u32)>, Widths);
+
+/// Every block, in the order of the numbers.
+const BLOCK_FACTS: [Facts; BLOCKS] = {
+    use Block as B;
+    use Widths::{Any, HalfWord, Word};
+    [
+        (B::Tim2, "TIM2", Some((1, 0)), HalfWord),
+        (B::Tim3, "TIM3", Some((1, 1)), HalfWord),
+        (B::Tim4, "TIM4", Some((1, 2)), HalfWord),
+        (B::Iwdg, "IWDG", None, HalfWord),
+        (B::Usart3, "USART3", Some((1, 18)), HalfWord),
+        (B::I2c1, "I2C1", Some((1, 21)), HalfWord),
+        (B::Afio, "AFIO", Some((0, 0)), Word),
+        (B::Exti, "EXTI", None, Word),
+        (B::GpioA, "GPIOA", Some((0, 2)), Word),
+        (B::GpioB, "GPIOB", Some((0, 3)), Word),
+        (B::GpioC, "GPIOC", Some((0, 4)), Word),
+        (B::GpioD, "GPIOD", Some((0, 5)), Word),
+        (B::Adc1, "ADC1", Some((0, 9)), Word),
+        (B::Tim1, "TIM1", Some((0, 11)), HalfWord),
+        (B::Usart1, "USART1", Some((0, 14)), HalfWord),
+        (B::Rcc, "RCC", None, Any),
+        (B::Flash, "FLASH", None, Word),
+        (B::Pwr, "PWR", Some((1, 28)), HalfWord),
+        (B::Crc, "CRC", Some((2, 6)), Word),
+    ]
+};
+
 impl Block {
     /// Every block, in the order of the numbers.
-    pub const ALL: [Self; BLOCKS] = [
-        Self::Tim2,
-        Self::Tim3,
-        Self::Tim4,
-        Self::Iwdg,
-        Self::Usart3,
-        Self::I2c1,
-        Self::Afio,
-        Self::Exti,
-        Self::GpioA,
-        Self::GpioB,
-        Self::GpioC,
-        Self::GpioD,
-        Self::Adc1,
-        Self::Tim1,
-        Self::Usart1,
-        Self::Rcc,
-        Self::Flash,
-        Self::Pwr,
-        Self::Crc,
-    ];
+    pub const ALL: [Self; BLOCKS] = {
+        let mut all = [Self::Tim2; BLOCKS];
+        let mut n = 0;
+        while n < BLOCKS {
+            all[n] = BLOCK_FACTS[n].0;
+            n += 1;
+        }
+        all
+    };
 
     /// Returns the block whose clock and reset are bit `bit` of RCC's registers for APB2 (`bus` 0) or APB1 (`bus` 1).
     #[must_use]
@@ -174,79 +193,22 @@ impl Block {
     }
 
     /// Returns the bus, APB2 (0), APB1 (1) or AHB (2), and the bit in RCC's registers that enables the clock of the block
-    /// and resets it, if the bus is an APB (RM0008 7.3.4 to 7.3.8). `None` if the block always has its clock.
+    /// and, on APB1 and APB2, resets it (RM0008 7.3.4 to 7.3.8). `None` if the block always has its clock.
     #[must_use]
     pub const fn clock(self) -> Option<(usize, u32)> {
-        Some(match self {
-            Self::Afio => (0, 0),
-            Self::GpioA => (0, 2),
-            Self::GpioB => (0, 3),
-            Self::GpioC => (0, 4),
-            Self::GpioD => (0, 5),
-            Self::Adc1 => (0, 9),
-            Self::Tim1 => (0, 11),
-            Self::Usart1 => (0, 14),
-            Self::Tim2 => (1, 0),
-            Self::Tim3 => (1, 1),
-            Self::Tim4 => (1, 2),
-            Self::Usart3 => (1, 18),
-            Self::I2c1 => (1, 21),
-            Self::Pwr => (1, 28),
-            Self::Crc => (2, 6),
-            Self::Iwdg | Self::Exti | Self::Rcc | Self::Flash => return None,
-        })
+        BLOCK_FACTS[self as usize].2
     }
 
-    /// Access widths that the block allows. The section of its registers in RM0008 begins with them.
+    /// Returns the access widths that the block allows.
     #[must_use]
     pub const fn widths(self) -> Widths {
-        match self {
-            Self::Rcc => Widths::Any,
-            Self::Tim1
-            | Self::Tim2
-            | Self::Tim3
-            | Self::Tim4
-            | Self::Iwdg
-            | Self::Usart1
-            | Self::Usart3
-            | Self::I2c1
-            | Self::Pwr => Widths::HalfWord,
-            Self::Afio
-            | Self::Exti
-            | Self::GpioA
-            | Self::GpioB
-            | Self::GpioC
-            | Self::GpioD
-            | Self::Adc1
-            | Self::Crc
-            | Self::Flash => Widths::Word,
-        }
+        BLOCK_FACTS[self as usize].3
     }
 
     /// Returns the name of the block in RM0008.
     #[must_use]
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::Tim2 => "TIM2",
-            Self::Tim3 => "TIM3",
-            Self::Tim4 => "TIM4",
-            Self::Iwdg => "IWDG",
-            Self::Usart3 => "USART3",
-            Self::I2c1 => "I2C1",
-            Self::Afio => "AFIO",
-            Self::Exti => "EXTI",
-            Self::GpioA => "GPIOA",
-            Self::GpioB => "GPIOB",
-            Self::GpioC => "GPIOC",
-            Self::GpioD => "GPIOD",
-            Self::Adc1 => "ADC1",
-            Self::Tim1 => "TIM1",
-            Self::Usart1 => "USART1",
-            Self::Rcc => "RCC",
-            Self::Flash => "FLASH",
-            Self::Pwr => "PWR",
-            Self::Crc => "CRC",
-        }
+        BLOCK_FACTS[self as usize].1
     }
 }
 

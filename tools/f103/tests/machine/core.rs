@@ -6,7 +6,7 @@ use f103::finding::What;
 use super::asm::{Asm, When};
 use super::debug::counting;
 use super::regs::*;
-use super::{START, chip, findings, out};
+use super::{START, chip, findings, out, to_72_mhz};
 
 #[test]
 fn step_executes_the_given_number_of_instructions_at_their_costs() {
@@ -162,14 +162,7 @@ fn systick_program(fast: bool) -> Asm {
     program.store(RCC_APB2ENR, 1 << 4);
     program.store(GPIOC + 4, 0x4424_4444);
     if fast {
-        program.store(FLASH_ACR, 0x12);
-        program.store(RCC_CR, 0x1_0083);
-        program.wait_set(RCC_CR, 1 << 17);
-        program.store(RCC_CFGR, 0x001D_0400);
-        program.store(RCC_CR, 0x0101_0083);
-        program.wait_set(RCC_CR, 1 << 25);
-        program.store(RCC_CFGR, 0x001D_0402);
-        program.wait_set(RCC_CFGR, 8);
+        to_72_mhz(&mut program, 0x1_0083);
     }
     program.set(4, GPIOC);
     program.set(5, 1 << 13);

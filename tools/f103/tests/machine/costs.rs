@@ -4,20 +4,13 @@ use f103::chip::Config;
 use f103::{Chip, Corner, Time};
 
 use super::asm::{Asm, When};
-use super::chip_with;
 use super::regs::*;
+use super::{chip_with, to_72_mhz};
 
-/// Sets the part to 72 MHz from the crystal, with two wait states and the prefetch buffer.
+/// Sets the part to 72 MHz, with the clocks of port A and TIM2.
 fn fast() -> Asm {
     let mut program = Asm::new();
-    program.store(FLASH_ACR, 0x12);
-    program.store(RCC_CR, 1 << 16 | 1);
-    program.wait_set(RCC_CR, 1 << 17);
-    program.store(RCC_CFGR, 1 << 16 | 7 << 18 | 4 << 8);
-    program.store(RCC_CR, 1 << 24 | 1 << 16 | 1);
-    program.wait_set(RCC_CR, 1 << 25);
-    program.store(RCC_CFGR, 2 | 1 << 16 | 7 << 18 | 4 << 8);
-    program.wait_set(RCC_CFGR, 8);
+    to_72_mhz(&mut program, 1 << 16 | 1);
     program.store(RCC_APB2ENR, 1 << 2);
     program.store(RCC_APB1ENR, 1);
     program

@@ -4,7 +4,7 @@ use f103::{Chip, Time};
 
 use super::asm::{Asm, When};
 use super::regs::*;
-use super::{chip, findings, out};
+use super::{chip, findings, out, to_72_mhz};
 
 const CSSON: u32 = 1 << 19;
 const HSERDY: u32 = 1 << 17;
@@ -19,14 +19,7 @@ const RUNNING: Time = Time::from_ms(10);
 fn fast(security: bool) -> Asm {
     let cr = 0x1_0083 | if security { CSSON } else { 0 };
     let mut program = Asm::new();
-    program.store(FLASH_ACR, 0x12);
-    program.store(RCC_CR, cr);
-    program.wait_set(RCC_CR, HSERDY);
-    program.store(RCC_CFGR, 0x001D_0400);
-    program.store(RCC_CR, cr | 1 << 24);
-    program.wait_set(RCC_CR, 1 << 25);
-    program.store(RCC_CFGR, 0x001D_0402);
-    program.wait_set(RCC_CFGR, 8);
+    to_72_mhz(&mut program, cr);
     program.set(6, 0);
     program
 }

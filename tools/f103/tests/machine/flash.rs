@@ -6,7 +6,7 @@ use f103::periph::flash::{Durations, Torn};
 
 use super::asm::{Asm, When};
 use super::regs::*;
-use super::{chip, chip_with, findings, out};
+use super::{chip_with, findings, out};
 
 /// Address of the page that the programs use: the last but one.
 const PAGE: u32 = 0x0801_F800;
@@ -210,30 +210,6 @@ fn program_reads_unsteady_cells_differently_from_read_to_read() {
 }
 
 #[test]
-fn power_cut_in_an_erase_leaves_the_same_cells_every_time() {
-    let run = |fraction, torn| {
-        let mut program = Asm::new();
-        unlock(&mut program);
-        erase(&mut program);
-        program.spin();
-        let mut chip = chip_with(&program.image(), filled());
-        chip.set_torn(torn);
-        chip.cut_in_flash_operation(1, fraction);
-        chip.run_until(Time::from_ms(60));
-        assert!(!chip.powered());
-        assert_eq!(chip.now(), Time::from_ms(60));
-        chip.flash()[OFFSET..OFFSET + 1024].to_vec()
-    };
-    let ones = |page: &[u8]| page.iter().map(|b| b.count_ones()).sum::<u32>();
-    let half = run(0.5, Torn::Mess);
-    assert!((3_500..4_700).contains(&ones(&half)), "{}", ones(&half));
-    assert_eq!(half, run(0.5, Torn::Mess));
-    assert_eq!(ones(&run(0.999, Torn::Before)), 0);
-    assert_eq!(ones(&run(0.0, Torn::After)), 8192);
-    assert_eq!(ones(&run(0.0, Torn::Mess)), 0);
-}
-
-#[test]
 fn power_cut_between_any_two_instructions_keeps_the_written_half_words() {
     // The program writes 0x1111 to 0x4444 to four half-words, then loops.
     let image = || {
@@ -286,19 +262,6 @@ fn durations_can_be_set_and_a_locked_flash_refuses_writes() {
     assert_eq!(chip.flash()[OFFSET], 0xFF);
     assert_eq!(chip.flash_operations(), 1);
     assert_eq!(findings(&chip), ["flash: FLASH_CR written while locked"; 2]);
-}
-
-#[test]
-fn a_wrong_key_is_a_bus_fault() {
-    let mut program = Asm::new();
-    program.store(FLASH_KEYR, 0x1234);
-    program.spin();
-    program.handler(3);
-    program.store(OUT, 0xFA);
-    program.spin();
-    let mut chip = chip(program);
-    chip.step(50);
-    assert_eq!(out(&chip, 0), 0xFA);
 }
 
 #[test]

@@ -28,6 +28,19 @@ fn chip_with(image: &Image, config: Config) -> Chip<()> {
     Chip::in_circuit(image, config, ()).expect("the program fits")
 }
 
+/// Starts the crystal with this value of RCC_CR, and 72 MHz from it, with two wait states and the prefetch buffer.
+fn to_72_mhz(program: &mut Asm, cr: u32) {
+    use regs::{FLASH_ACR, RCC_CFGR, RCC_CR};
+    program.store(FLASH_ACR, 0x12);
+    program.store(RCC_CR, cr);
+    program.wait_set(RCC_CR, 1 << 17);
+    program.store(RCC_CFGR, 0x001D_0400);
+    program.store(RCC_CR, cr | 1 << 24);
+    program.wait_set(RCC_CR, 1 << 25);
+    program.store(RCC_CFGR, 0x001D_0402);
+    program.wait_set(RCC_CFGR, 8);
+}
+
 /// Returns the `n`th word that a program has stored at [`regs::OUT`].
 fn out(chip: &Chip<()>, n: u32) -> u32 {
     chip.word(regs::OUT + 4 * n).expect("in SRAM")

@@ -81,35 +81,6 @@ fn an_address_after_the_last_of_a_memory_is_a_bus_fault() {
 }
 
 #[test]
-fn a_high_density_part_erases_a_page_of_2_kib_while_its_code_stalls() {
-    const LAST: u32 = 0x0803_F800;
-    let mut program = Asm::new();
-    program.store(FLASH_KEYR, 0x4567_0123);
-    program.store(FLASH_KEYR, 0xCDEF_89AB);
-    program.store(FLASH_CR, 2);
-    program.store(FLASH_AR, LAST + 0x400);
-    program.store(FLASH_CR, 0x42);
-    (0..8).for_each(|_| program.nop());
-    program.copy(LAST, OUT);
-    program.spin();
-    let config = chip::Config {
-        part: &STM32F103RC,
-        flash: Some(vec![0; STM32F103RC.flash_size]),
-        ..chip::Config::default()
-    };
-    let mut chip = Chip::in_circuit(&program.image(), config, ()).expect("the program fits");
-    chip.run_until(Time::from_ms(60));
-    assert_eq!(out(&chip, 0), u32::MAX);
-    let page = LAST as usize - 0x0800_0000;
-    assert!(chip.flash()[page..].iter().all(|byte| *byte == 0xFF));
-    assert_eq!(chip.flash()[page - 1], 0);
-    // The eight instructions that were fetched in advance run in the first microsecond of the erase.
-    let stalled = Time::from_ms(30) - Time::from_us(1);
-    assert_eq!(chip.core_time().stalled, stalled);
-    assert_eq!(findings(&chip), [""; 0]);
-}
-
-#[test]
 fn code_in_the_upper_sram_of_a_high_density_part_runs() {
     const UPPER: u32 = 0x2000_A000;
     let mut program = Asm::new();

@@ -143,27 +143,6 @@ fn power_cycle_loses_sram_and_sets_the_power_on_flag() {
 }
 
 #[test]
-fn crystal_is_ready_after_two_milliseconds_or_never() {
-    for crystal in [true, false] {
-        let mut program = Asm::new();
-        program.store(RCC_CR, 0x1_0083);
-        program.wait_set(RCC_CR, 1 << 17);
-        program.store(OUT, 0xC0);
-        program.spin();
-        let config = Config {
-            crystal,
-            ..Config::default()
-        };
-        let mut chip = chip_with(&program.image(), config);
-        chip.ram_mut()[0] = 0;
-        chip.run_until(START + Time::from_us(1_990));
-        assert_ne!(out(&chip, 0), 0xC0);
-        chip.run_until(Time::from_secs(1));
-        assert_eq!(out(&chip, 0) == 0xC0, crystal);
-    }
-}
-
-#[test]
 fn factory_words_read_as_configured() {
     let mut program = Asm::new();
     program.copy(0x1FFF_F7E0, OUT);

@@ -98,32 +98,6 @@ mod tests {
     use super::*;
     use crate::app::{Origin, testing::bench};
 
-    #[test]
-    fn frames_are_in_the_file_as_soon_as_they_have_ended() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("line.pcapng");
-        let mut capture = Capture::create(&path).unwrap();
-        let mut bench = bench(Module::Di4);
-        let size = || std::fs::metadata(&path).unwrap().len();
-        let mut sizes = vec![size()];
-        for pdu in [&[7][..], &[3, 0, 0, 0, 1]] {
-            bench.send(&Framing::Rtu.frame(0, 1, pdu), Origin::Pty);
-            bench.bus.run_for(Time::from_ms(20));
-            capture.update(bench.bus.line());
-            capture.update(bench.bus.line());
-            sizes.push(size());
-        }
-        let grown: Vec<_> = sizes.windows(2).map(|two| two[1] - two[0]).collect();
-        assert!(
-            grown.iter().all(|bytes| (80..250).contains(bytes)),
-            "{grown:?}"
-        );
-        let written = std::fs::read(&path).unwrap();
-        let frame = Framing::Rtu.frame(0, 1, &[3, 0, 0, 0, 1]);
-        let times = written.windows(8).filter(|bytes| *bytes == frame).count();
-        assert_eq!(times, 1, "each frame once");
-    }
-
     #[cfg(unix)]
     #[test]
     fn closing_the_reading_end_of_a_pipe_ends_the_recording() {

@@ -3,9 +3,9 @@
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Write};
 use std::sync::mpsc::{self, Receiver};
-use std::time::Instant;
 
 use super::*;
+use crate::app::testing::eventually;
 
 fn open(path: &Path) -> File {
     OpenOptions::new()
@@ -25,14 +25,6 @@ fn received(queue: &Receiver<Event>, wanted: usize) -> Vec<u8> {
         }
     }
     all
-}
-
-fn eventually(what: &str, mut is: impl FnMut() -> bool) {
-    let end = Instant::now() + Duration::from_secs(20);
-    while !is() {
-        assert!(Instant::now() < end, "{what}");
-        thread::sleep(Duration::from_millis(1));
-    }
 }
 
 fn is_open(pty: &Pty) -> bool {

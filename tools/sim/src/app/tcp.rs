@@ -122,16 +122,9 @@ fn read(client: &Arc<Client>, events: &Sender<Event>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::net::{TcpListener, TcpStream};
-    use std::time::{Duration, Instant};
-
-    fn eventually(what: &str, mut is: impl FnMut() -> bool) {
-        let end = Instant::now() + Duration::from_secs(20);
-        while !is() {
-            assert!(Instant::now() < end, "{what}");
-            thread::sleep(Duration::from_millis(2));
-        }
-    }
+    use crate::app::testing::eventually;
+    use std::net::TcpStream;
+    use std::time::Duration;
 
     #[test]
     fn bytes_of_a_client_are_an_event_and_clients_receive_all_bytes_except_their_own() {
@@ -187,16 +180,5 @@ mod tests {
         master.write_all(b"G").unwrap();
         let event = queue.recv_timeout(Duration::from_secs(20)).unwrap();
         assert!(matches!(event, Event::Tcp(_, bytes, _) if bytes == b"G"));
-    }
-
-    #[test]
-    fn port_in_use_is_an_error() {
-        let taken = TcpListener::bind("127.0.0.1:0").unwrap();
-        let address = taken.local_addr().unwrap();
-        let text = Tcp::listen(address, mpsc::channel().0).err().unwrap();
-        assert!(
-            text.contains(&address.to_string()) && text.contains(crate::app::testing::IN_USE),
-            "{text}"
-        );
     }
 }

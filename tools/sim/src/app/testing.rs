@@ -1,4 +1,7 @@
-//! Boards for tests of the command. The core runs an endless loop; the rest of the board works as usual.
+//! Boards and waits for tests of the command. The core of a board runs an endless loop; the rest of the board works as usual.
+
+use std::thread;
+use std::time::{Duration, Instant};
 
 use register_map::Module;
 use sim::{Board, Config, Image};
@@ -6,12 +9,6 @@ use sim::{Board, Config, Image};
 use super::bench::Bench;
 use super::unit::Unit;
 
-/// Part of the message about an address in use. The text of Windows depends on its language.
-pub const IN_USE: &str = if cfg!(windows) {
-    "(os error 10048)"
-} else {
-    "in use"
-};
 /// Part of the message about a missing directory.
 pub const NO_DIRECTORY: &str = if cfg!(windows) {
     "(os error 3)"
@@ -21,6 +18,15 @@ pub const NO_DIRECTORY: &str = if cfg!(windows) {
 
 /// Machine code: the vector table (stack, reset), and `b .` after it.
 const LOOP: [u8; 10] = [0x00, 0x50, 0x00, 0x20, 0x09, 0x00, 0x00, 0x08, 0xFE, 0xE7];
+
+/// Waits until `is()` returns true, at most 20 s.
+pub fn eventually(what: &str, mut is: impl FnMut() -> bool) {
+    let end = Instant::now() + Duration::from_secs(20);
+    while !is() {
+        assert!(Instant::now() < end, "{what}");
+        thread::sleep(Duration::from_millis(1));
+    }
+}
 
 /// Returns a board with this module, and its power on.
 pub fn board(module: Module) -> Board {

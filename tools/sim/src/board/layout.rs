@@ -39,11 +39,7 @@ pub struct Layout {
 pub const MODIO_02: Layout = Layout {
     board: &board::MODIO_02,
     part: STM32F103CB,
-    slots: &[SlotPins {
-        port: 5,
-        lines: pins([('A', 0), ('A', 1), ('A', 2), ('A', 3)]),
-        dac_address: mcp4728::ADDRESS,
-    }],
+    slots: &[slot(5, 0, [('A', 0), ('A', 1), ('A', 2), ('A', 3)])],
     switch: pins([
         ('A', 4),
         ('A', 5),
@@ -66,26 +62,10 @@ pub const MODIO_08: Layout = Layout {
     board: &board::MODIO_08,
     part: STM32F103RC,
     slots: &[
-        SlotPins {
-            port: 1,
-            lines: pins([('A', 0), ('A', 1), ('A', 2), ('A', 3)]),
-            dac_address: mcp4728::ADDRESS,
-        },
-        SlotPins {
-            port: 2,
-            lines: pins([('A', 4), ('A', 5), ('A', 6), ('A', 7)]),
-            dac_address: mcp4728::ADDRESS + 1,
-        },
-        SlotPins {
-            port: 3,
-            lines: pins([('C', 0), ('C', 1), ('C', 2), ('C', 3)]),
-            dac_address: mcp4728::ADDRESS + 2,
-        },
-        SlotPins {
-            port: 4,
-            lines: pins([('B', 0), ('B', 1), ('C', 4), ('C', 5)]),
-            dac_address: mcp4728::ADDRESS + 3,
-        },
+        slot(1, 0, [('A', 0), ('A', 1), ('A', 2), ('A', 3)]),
+        slot(2, 1, [('A', 4), ('A', 5), ('A', 6), ('A', 7)]),
+        slot(3, 2, [('C', 0), ('C', 1), ('C', 2), ('C', 3)]),
+        slot(4, 3, [('B', 0), ('B', 1), ('C', 4), ('C', 5)]),
     ],
     switch: pins([
         ('C', 6),
@@ -112,6 +92,15 @@ impl Layout {
     #[must_use]
     pub fn of(board: &Board) -> Option<&'static Self> {
         Self::ALL.into_iter().find(|layout| layout.board == board)
+    }
+}
+
+/// Returns a slot whose DAC has the `dac`th address.
+const fn slot(port: u8, dac: u8, lines: [(char, usize); 4]) -> SlotPins {
+    SlotPins {
+        port,
+        lines: pins(lines),
+        dac_address: mcp4728::ADDRESS + dac,
     }
 }
 

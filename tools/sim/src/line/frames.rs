@@ -61,18 +61,11 @@ pub struct Record {
     last_end: Option<Time>,
     /// Unit address, PDU and end of the last request, until a unit answers.
     request: Option<(u8, Vec<u8>, Time)>,
-    keep_all: bool,
     from_master: u64,
     from_unit: u64,
 }
 
 impl Record {
-    /// Chooses whether the record keeps every frame or only the last [`KEPT`].
-    pub fn set_keep_all(&mut self, all: bool) {
-        self.keep_all = all;
-        self.trim();
-    }
-
     /// Adds a received word. A silence of `silence` ends a frame.
     pub fn word(&mut self, word: &Word, direction: Direction, collided: bool, silence: Time) {
         let continues = self.open.as_ref().is_some_and(|frame| {
@@ -157,11 +150,7 @@ impl Record {
             }
         }
         self.kept.push_back(frame);
-        self.trim();
-    }
-
-    fn trim(&mut self) {
-        while !self.keep_all && self.kept.len() > KEPT {
+        if self.kept.len() > KEPT {
             self.kept.pop_front();
         }
     }
@@ -226,16 +215,6 @@ mod tests {
         let numbers: Vec<_> = record.frames().map(|f| f.number).collect();
         assert_eq!((numbers.len(), numbers[0], numbers[999]), (1000, 201, 1200));
         assert_eq!(record.since(1190).count(), 10);
-        record.set_keep_all(true);
-        for n in 0..10 {
-            record.word(
-                &word(3_000_000 + n * 1000, 1),
-                Direction::FromUnit,
-                false,
-                SILENCE,
-            );
-        }
-        assert_eq!(record.frames().count(), 1009);
     }
 
     #[test]

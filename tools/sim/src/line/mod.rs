@@ -79,7 +79,6 @@ pub struct Line {
     driver_edges: VecDeque<(Time, bool)>,
     collisions: VecDeque<Span>,
     findings: Vec<(Time, &'static str)>,
-    keep_all: bool,
     /// The other units on a bus with several units.
     shared: Shared,
     /// The line is computed up to this instant.
@@ -109,7 +108,6 @@ impl Default for Line {
             driver_edges: VecDeque::new(),
             collisions: VecDeque::new(),
             findings: Vec::new(),
-            keep_all: false,
             shared: Shared::default(),
             now: Time::ZERO,
         }
@@ -132,13 +130,6 @@ impl Line {
     /// master without settings, such as the client of a socket.
     pub fn set_follow(&mut self, follow: bool) {
         self.follow = follow;
-    }
-
-    /// Chooses whether every frame, received character, driver edge and collision is kept from now on. Otherwise the
-    /// last [`KEPT`] frames are kept, and the last 65 536 of each other list.
-    pub fn set_keep_all(&mut self, all: bool) {
-        self.keep_all = all;
-        self.record.set_keep_all(all);
     }
 
     /// Returns the complete frames that are kept, oldest first.
@@ -196,10 +187,10 @@ impl Line {
     }
 }
 
-/// Appends to a list. Unless `all` are kept, removes the oldest entry of a list with [`KEPT_EVENTS`] entries.
-fn keep<T>(list: &mut VecDeque<T>, entry: T, all: bool) {
+/// Appends to a list. Removes the oldest entry of a list with [`KEPT_EVENTS`] entries.
+fn keep<T>(list: &mut VecDeque<T>, entry: T) {
     // Remove before the push, so that a full list does not allocate twice its length.
-    if !all && list.len() >= KEPT_EVENTS {
+    if list.len() >= KEPT_EVENTS {
         list.pop_front();
     }
     list.push_back(entry);

@@ -267,7 +267,7 @@ impl Line {
             }
             let on = drivers(&shared.others);
             if (before > 0) != (on > 0) {
-                keep(&mut self.driver_edges, (at, on > 0), self.keep_all);
+                keep(&mut self.driver_edges, (at, on > 0));
             }
             if at >= to {
                 break;
@@ -284,7 +284,7 @@ impl Line {
             if on + usize::from(sends) > 1 {
                 match self.collisions.back_mut() {
                     Some(last) if last.end == at => last.end = end,
-                    _ => keep(&mut self.collisions, Span { start: at, end }, self.keep_all),
+                    _ => keep(&mut self.collisions, Span { start: at, end }),
                 }
             }
             at = end;

@@ -94,7 +94,7 @@ impl Line {
         }
         self.driver = on;
         self.shared.switched(now, on);
-        keep(&mut self.driver_edges, (now, on), self.keep_all);
+        keep(&mut self.driver_edges, (now, on));
         self.settle(now);
     }
 
@@ -217,7 +217,7 @@ impl Line {
             }
             match self.collisions.back_mut() {
                 Some(last) if last.end == start => last.end = end,
-                _ => keep(&mut self.collisions, Span { start, end }, self.keep_all),
+                _ => keep(&mut self.collisions, Span { start, end }),
             }
         }
     }
@@ -278,7 +278,7 @@ impl Line {
                 noise: word.noise,
                 collided,
             };
-            keep(&mut self.received, received, self.keep_all);
+            keep(&mut self.received, received);
         }
     }
 }

@@ -10,16 +10,6 @@ const TEMPORARY: u8 = 0xC2;
 /// Answer to C3 C3 C3: the head, 0x32 for 433 MHz, a version, and 0x10 for a TTL interface plus 20 dBm.
 const VERSION: [u8; 4] = [0xC3, 0x32, 0x10, 0x24];
 
-/// Answer of a module to the commands C0 and C2. Modules in the field differ.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Confirmation {
-    /// The head of the command and the parameters: 6 bytes.
-    #[default]
-    Parameters,
-    /// `OK`, carriage return, line feed.
-    Text,
-}
-
 /// A command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Command {
@@ -83,7 +73,7 @@ impl Memory {
     }
 
     /// Carries out a command. Returns its answer; empty for a reset, which the module does.
-    pub(super) fn carry_out(&mut self, command: Command, confirmation: Confirmation) -> Vec<u8> {
+    pub(super) fn carry_out(&mut self, command: Command) -> Vec<u8> {
         match command {
             Command::Set { parameters, kept } => {
                 self.in_force = parameters;
@@ -91,10 +81,7 @@ impl Memory {
                 if kept {
                     self.stored = parameters;
                 }
-                match confirmation {
-                    Confirmation::Parameters => self.answer(),
-                    Confirmation::Text => b"OK\r\n".to_vec(),
-                }
+                self.answer()
             }
             Command::Read => self.answer(),
             Command::Version => VERSION.to_vec(),
@@ -135,7 +122,7 @@ mod tests {
         let mut memory = Memory::new(Parameters::FACTORY);
         let do_it = |memory: &mut Memory, bytes: &[u8]| {
             let command = Command::of(bytes).expect("a command");
-            memory.carry_out(command, Confirmation::default())
+            memory.carry_out(command)
         };
         let set = [0xC2, 0x12, 0x34, 0x3D, 0x1F, 0x40];
         assert_eq!(do_it(&mut memory, &set), set);
@@ -147,8 +134,5 @@ mod tests {
         assert_eq!(do_it(&mut memory, &set), set);
         memory.restart();
         assert_eq!(do_it(&mut memory, &[0xC1; 3]), set);
-        let command = Command::of(&factory).expect("a command");
-        let text = memory.carry_out(command, Confirmation::Text);
-        assert_eq!(text, b"OK\r\n");
     }
 }

@@ -44,7 +44,6 @@ mod tests;
 
 pub use air::Air;
 pub(crate) use air::tell;
-pub use command::Confirmation;
 pub use module::{Fault, Module};
 pub(crate) use packet::News;
 pub use packet::{Packet, Sender};

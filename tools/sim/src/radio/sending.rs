@@ -16,23 +16,14 @@ pub(super) struct Sending {
     on_air: Option<Time>,
     /// The next packet cannot begin before this instant.
     free_at: Time,
-    /// Number of bytes that were lost because the buffer was full.
-    lost: u64,
 }
 
 impl Sending {
-    /// Returns the number of bytes that were lost because the buffer was full.
-    pub(super) const fn lost(&self) -> u64 {
-        self.lost
-    }
-
-    /// Takes a byte from the UART. The UART is silent at `silent_at` if no other byte follows.
+    /// Takes a byte from the UART; it is lost if the buffer is full. The UART is silent at `silent_at` if no other byte follows.
     pub(super) fn put(&mut self, byte: u8, silent_at: Time) {
         self.silent_at = silent_at;
         if self.buffer.len() < timing::BUFFER_BYTES {
             self.buffer.push_back(byte);
-        } else {
-            self.lost += 1;
         }
     }
 
@@ -82,10 +73,7 @@ impl Sending {
     /// Drops everything, as without power. Returns whether this has cut a packet.
     pub(super) fn cut(&mut self) -> bool {
         let cut = self.on_air.is_some();
-        *self = Self {
-            lost: self.lost,
-            ..Self::default()
-        };
+        *self = Self::default();
         cut
     }
 }

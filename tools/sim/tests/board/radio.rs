@@ -173,26 +173,6 @@ fn faulty_module_is_absent_or_holds_aux_low() {
 }
 
 #[test]
-fn stored_parameters_survive_a_power_cycle_and_temporary_ones_do_not() {
-    for (head, address) in [(0xC0, 7), (0xC2, 0)] {
-        let mut program = set_up();
-        let command = [head, 0x00, 0x07, 0x1A, 0x17, 0x44];
-        exchange(&mut program, aux(&MODIO_02), &command, 6);
-        program.spin();
-        let mut board = fitted(&MODIO_02, program);
-        board.run_until(timing::START_UP + ms(200));
-        assert_eq!(results(&board, 6), command);
-        assert_eq!(board.radio().unwrap().parameters().address(), 7);
-        board.power_off();
-        board.run_for(ms(10));
-        assert_eq!(board.radio().unwrap().mode(), None);
-        board.power_on();
-        board.run_for(ms(10));
-        assert_eq!(board.radio().unwrap().parameters().address(), address);
-    }
-}
-
-#[test]
 fn short_reset_of_the_part_does_not_change_the_mode() {
     let mut program = set_up();
     select_normal_mode(&mut program);

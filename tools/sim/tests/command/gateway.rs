@@ -5,7 +5,7 @@ use std::net::TcpStream;
 
 use modbus_line::adu::Framing;
 
-use super::{IN_USE, Running, connect, endless_loop, eventually, refused, state};
+use super::{Running, connect, eventually, state};
 
 const READ: &[u8] = &[3, 2, 0, 0, 1];
 
@@ -195,22 +195,10 @@ fn halted_core_is_exception_0a_until_the_debugger_leaves() {
     });
 }
 
-#[test]
-fn port_in_use_is_refused() {
-    let directory = tempfile::tempdir().unwrap();
-    let elf = endless_loop(directory.path());
-    let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
-    let address = taken.local_addr().unwrap().to_string();
-    let arguments = ["--http", "127.0.0.1:0", "--modbus-tcp", &address];
-    let arguments = [&["--elf", elf.to_str().unwrap()][..], &arguments].concat();
-    refused(&arguments, &["Modbus TCP", &address, IN_USE]);
-}
-
 /// Returns a simulator that runs the image.
 fn image(more: &[&str]) -> (Running, String, String) {
     let image = std::env::var("MODIO_ELF").expect("MODIO_ELF names the image");
-    let first = ["--elf", &image, "--http", "127.0.0.1:0"];
-    ready(Running::start(&[&first, &GATEWAY[..], more].concat()))
+    ready(Running::start_image(&image, &[&GATEWAY[..], more].concat()))
 }
 
 fn write(address: u16, value: u16) -> Vec<u8> {

@@ -22,14 +22,7 @@ struct Debugged {
 impl Debugged {
     fn start(directory: &Path) -> Self {
         let elf = elf(directory, &COUNTING);
-        let mut running = Running::start(&[
-            "--elf",
-            elf.to_str().unwrap(),
-            "--http",
-            "127.0.0.1:0",
-            "--gdb",
-            "127.0.0.1:0",
-        ]);
+        let mut running = Running::start_image(elf.to_str().unwrap(), &["--gdb", "127.0.0.1:0"]);
         running.line();
         let http = running.endpoint("http: http://");
         let gdb = running.endpoint("gdb: ");

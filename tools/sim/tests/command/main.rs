@@ -57,11 +57,9 @@ fn signals_end_the_simulator_with_success_and_remove_the_link() {
     let elf = endless_loop(directory.path());
     for signal in ["-INT", "-TERM"] {
         let link = directory.path().join("line");
-        let mut arguments = vec!["--elf", elf.to_str().unwrap(), "--http", "127.0.0.1:0"];
-        if sim::options::PTY {
-            arguments.extend(["--pty", link.to_str().unwrap()]);
-        }
-        let mut running = Running::start(&arguments);
+        let pty = ["--pty", link.to_str().unwrap()];
+        let more = if sim::options::PTY { &pty[..] } else { &[] };
+        let mut running = Running::start_image(elf.to_str().unwrap(), more);
         let pty = running.line();
         if sim::options::PTY {
             assert_eq!(fs::read_link(&link).unwrap(), std::path::Path::new(&pty));
@@ -147,37 +145,24 @@ fn an_image_that_is_missing_or_broken_is_refused() {
 }
 
 #[test]
-fn a_port_or_a_link_in_use_is_refused() {
+fn port_or_link_in_use_or_flash_file_that_cannot_be_written_is_refused() {
     let directory = tempfile::tempdir().unwrap();
     let elf = endless_loop(directory.path());
     let elf = elf.to_str().unwrap();
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = taken.local_addr().unwrap().to_string();
-    refused(&["--elf", elf, "--http", &address], &[&address, IN_USE]);
-    let tcp = ["--elf", elf, "--http", "127.0.0.1:0", "--tcp", &address];
-    refused(&tcp, &[&address, IN_USE]);
-    let gdb = ["--elf", elf, "--http", "127.0.0.1:0", "--gdb", &address];
-    refused(&gdb, &[&address, IN_USE]);
-    let pty = ["--elf", elf, "--http", "127.0.0.1:0", "--pty", elf];
-    let part = if sim::options::PTY { elf } else { "--tcp" };
-    refused(&pty, &[part]);
-}
-
-#[test]
-fn flash_file_that_is_invalid_or_cannot_be_written_is_refused() {
-    let directory = tempfile::tempdir().unwrap();
-    let elf = endless_loop(directory.path());
-    let elf = elf.to_str().unwrap();
-    let refused = |flash: &str, part: &str| {
-        let arguments = ["--elf", elf, "--http", "127.0.0.1:0", "--flash", flash];
-        crate::refused(&arguments, &[flash, part]);
+    let http = ["--elf", elf, "--http", &address];
+    refused(&http, &["--http", &address, IN_USE]);
+    let refused = |option, value: &str, parts: &[&str]| {
+        let arguments = ["--elf", elf, "--http", "127.0.0.1:0", option, value];
+        refused(&arguments, parts);
     };
-    refused(directory.path().to_str().unwrap(), "not a file");
-    refused(elf, "bytes, but the flash has 131072");
-    refused("/nowhere/flash", NO_DIRECTORY);
-    if cfg!(target_os = "linux") {
-        refused("/proc/flash", "");
-    }
+    refused("--tcp", &address, &[&address, IN_USE]);
+    refused("--gdb", &address, &[&address, IN_USE]);
+    refused("--modbus-tcp", &address, &["Modbus TCP", &address, IN_USE]);
+    let part = if sim::options::PTY { elf } else { "--tcp" };
+    refused("--pty", elf, &[part]);
+    refused("--flash", "/nowhere/flash", &[NO_DIRECTORY]);
 }
 
 #[test]
@@ -196,10 +181,9 @@ fn assert_preset(board: &[&str], fitting: &[&str], name: &str, settings: &[(u16,
     let elf = endless_loop(directory.path());
     let flash = directory.path().join("flash");
     let run = |more: &[&str]| {
-        let mut arguments = vec!["--elf", elf.to_str().unwrap(), "--for", "10ms"];
-        arguments.extend(["--http", "127.0.0.1:0", "--flash", flash.to_str().unwrap()]);
-        arguments.extend(board.iter().chain(more));
-        let mut running = Running::start(&arguments);
+        let first = ["--for", "10ms", "--flash", flash.to_str().unwrap()];
+        let all = [&first[..], board, more].concat();
+        let mut running = Running::start_image(elf.to_str().unwrap(), &all);
         assert_eq!(running.end(), (Some(0), String::new()));
         fs::read(&flash).unwrap()
     };

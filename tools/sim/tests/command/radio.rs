@@ -64,9 +64,8 @@ fn gateway_is_the_last_endpoint_and_its_link_is_removed_at_the_end() {
     let directory = tempfile::tempdir().unwrap();
     let elf = echoing(directory.path());
     let link = directory.path().join("radio");
-    let first = ["--elf", &elf, "--http", "127.0.0.1:0"];
     let more = ["--gdb", "127.0.0.1:0", "--lora", link.to_str().unwrap()];
-    let mut running = Running::start(&[first, more].concat());
+    let mut running = Running::start_image(&elf, &more);
     let line = running.line();
     running.endpoint("http: http://");
     running.endpoint("gdb: ");
@@ -89,14 +88,13 @@ fn bytes_at_the_gateway_reach_the_board_and_its_answer_comes_back() {
     let directory = tempfile::tempdir().unwrap();
     let elf = echoing(directory.path());
     let link = directory.path().join("radio");
-    let arguments = ["--elf", &elf, "--http", "127.0.0.1:0", "--lora"];
     let link = link.to_str().unwrap();
     for boards in [
         &[][..],
         &["--board", "modio-08"],
         &["--unit", "1", "--unit", "2"],
     ] {
-        let mut running = Running::start(&[&arguments[..], &[link], boards].concat());
+        let mut running = Running::start_image(&elf, &[&["--lora", link][..], boards].concat());
         running.line();
         let http = running.endpoint("http: http://");
         running.endpoint("lora: ");

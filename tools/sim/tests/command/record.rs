@@ -82,14 +82,7 @@ fn capture_file_that_cannot_be_written_is_refused() {
         (directory.path().to_str().unwrap(), "directory"),
         ("/dev/full", "No space"),
     ] {
-        let arguments = [
-            "--elf",
-            elf.to_str().unwrap(),
-            "--http",
-            "127.0.0.1:0",
-            "--record",
-            path,
-        ];
-        super::refused(&arguments, &[path, part]);
+        let elf = ["--elf", elf.to_str().unwrap(), "--http", "127.0.0.1:0"];
+        super::refused(&[&elf[..], &["--record", path]].concat(), &[path, part]);
     }
 }

@@ -98,12 +98,17 @@ impl Running {
         }
     }
 
+    /// Starts a simulator with an image, with HTTP on a free port.
+    pub fn start_image(elf: &str, more: &[&str]) -> Self {
+        let first = ["--elf", elf, "--http", "127.0.0.1:0"];
+        Self::start(&[&first[..], more].concat())
+    }
+
     /// Starts a simulator whose firmware is an endless loop, with HTTP on a free port.
     pub fn start_loop(more: &[&str]) -> Self {
         let directory = tempfile::tempdir().unwrap();
         let elf = endless_loop(directory.path());
-        let first = ["--elf", elf.to_str().unwrap(), "--http", "127.0.0.1:0"];
-        let mut running = Self::start(&[&first[..], more].concat());
+        let mut running = Self::start_image(elf.to_str().unwrap(), more);
         running._directory = Some(directory);
         running
     }

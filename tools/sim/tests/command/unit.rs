@@ -29,10 +29,8 @@ pub struct Unit {
 impl Unit {
     pub fn start(more: &[&str]) -> Self {
         let image = std::env::var("MODIO_ELF").expect("MODIO_ELF names the image");
-        let mut arguments = vec!["--elf", &image, "--tcp", "127.0.0.1:0"];
-        arguments.extend(["--http", "127.0.0.1:0"]);
-        arguments.extend(more);
-        let mut running = Running::start(&arguments);
+        let mut running =
+            Running::start_image(&image, &[&["--tcp", "127.0.0.1:0"][..], more].concat());
         running.skip_pty();
         let line = TcpStream::connect(running.endpoint("tcp: ")).unwrap();
         line.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
@@ -124,16 +122,8 @@ fn saved_configuration_survives_every_kind_of_end_of_the_simulator() {
     }
     // Another image is written over its own pages, which do not include those of the stored configuration.
     let other = super::endless_loop(directory.path());
-    let mut running = Running::start(&[
-        "--elf",
-        other.to_str().unwrap(),
-        "--http",
-        "127.0.0.1:0",
-        "--for",
-        "10ms",
-        option[0],
-        option[1],
-    ]);
+    let more = [["--for", "10ms"], option].concat();
+    let mut running = Running::start_image(other.to_str().unwrap(), &more);
     assert_eq!(running.end().0, Some(0));
     let mut unit = Unit::start(&option);
     assert_eq!(unit.read(FILTER), stored);

@@ -48,17 +48,21 @@ pub fn path(variable: &str) -> PathBuf {
         .into()
 }
 
-/// Returns a flash whose stored configuration has only the first slot's module.
-pub fn flash_with(module: Module) -> Vec<u8> {
-    let settings: Vec<_> = configuration::modules([(PORT, module)]).collect();
-    flash_with_settings(&settings)
-}
-
 /// Returns a flash whose stored configuration has these settings: address and value.
 pub fn flash_with_settings(pairs: &[(u16, u16)]) -> Vec<u8> {
     LAYOUT
         .flash_with(pairs)
         .expect("the settings fit in the store")
+}
+
+/// Returns the configuration of a board with this module, which is also stored, and with more stored settings.
+pub fn config(module: Module, settings: &[(u16, u16)]) -> Config {
+    let pairs = [&[(MODULE, module.code())], settings].concat();
+    Config {
+        module,
+        chip: sim::chip::Config::holding(flash_with_settings(&pairs)),
+        ..Config::default()
+    }
 }
 
 /// Returns the CRC-16/MODBUS, calculated bit by bit as in the standard's appendix B: slow, but independent of the
@@ -152,21 +156,14 @@ impl Bench {
     pub fn new(module: Module, dip: u8) -> Self {
         Self::with(Config {
             dip,
-            module,
-            chip: sim::chip::Config::holding(flash_with(module)),
-            ..Config::default()
+            ..config(module, &[])
         })
     }
 
     /// Returns a board with this module, unit address 1 and more stored settings.
     pub fn set_up(module: Module, settings: &[(u16, u16)]) -> Self {
-        let pairs = [&[(MODULE, module.code())], settings].concat();
-        let mut bench = Self::with(Config {
-            module,
-            chip: sim::chip::Config::holding(flash_with_settings(&pairs)),
-            ..Config::default()
-        });
-        let stored = |address| pairs.iter().find(|pair| pair.0 == address);
+        let mut bench = Self::with(config(module, settings));
+        let stored = |address| settings.iter().find(|pair| pair.0 == address);
         bench.settings(Settings {
             baud: stored(configuration::BAUD).map_or(9600, |pair| u32::from(pair.1) * 100),
             format: stored(configuration::FORMAT).map_or(Format::N2, |pair| format(pair.1)),

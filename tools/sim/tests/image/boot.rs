@@ -2,7 +2,7 @@
 
 use sim::{Config, Module, Time};
 
-use crate::bench::{Bench, FIRST, PORT, corner, flash_with, on_crystal};
+use crate::bench::{Bench, FIRST, PORT, config, corner, on_crystal};
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
@@ -35,10 +35,7 @@ fn unit_reports_the_commit_that_it_was_built_from() {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn unit_answers_within_a_hundred_milliseconds_of_power_on() {
-    let mut bench = Bench::cold(Config {
-        chip: sim::chip::Config::holding(flash_with(Module::Di4)),
-        ..Config::default()
-    });
+    let mut bench = Bench::cold(config(Module::Di4, &[]));
     bench.board.run_for(Time::from_ms(80));
     bench.assert_answers(1);
 }
@@ -46,13 +43,9 @@ fn unit_answers_within_a_hundred_milliseconds_of_power_on() {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn without_a_crystal_the_unit_logs_it_and_runs_on_the_internal_oscillator() {
-    let mut bench = Bench::with(Config {
-        chip: sim::chip::Config {
-            crystal: false,
-            ..sim::chip::Config::holding(flash_with(Module::Di4))
-        },
-        ..Config::default()
-    });
+    let mut config = config(Module::Di4, &[]);
+    config.chip.crystal = false;
+    let mut bench = Bench::with(config);
     bench.board.run_for(Time::from_ms(500));
     bench.assert_answers(1);
     let log = bench.board.take_log();
@@ -94,21 +87,19 @@ fn a_request_lights_the_activity_led() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn the_same_inputs_give_the_same_run_to_the_instruction() {
-    let run = || {
-        let mut bench = Bench::new(Module::Do4, 1);
-        bench.ask(1, &[0x0F, 0, FIRST, 0, 4, 1, 0x05]).unwrap();
-        bench.ask(1, &[1, 0, FIRST, 0, 4]).unwrap();
-        bench.board.run_for(Time::from_us(12_345));
-        let ram = bench.board.ram().to_vec();
-        (
-            bench.board.instructions(),
-            bench.board.now(),
-            bench.board.pc(),
-            ram,
-        )
-    };
-    assert!(run() == run());
+fn identify_makes_all_leds_blink_and_then_ends() {
+    let mut bench = Bench::set_up(Module::Di4, &[]);
+    bench.command(6);
+    bench.board.run_for(Time::from_ms(200));
+    let all_lit = (0..20).filter(|_| {
+        bench.board.run_for(Time::from_ms(50));
+        let leds = bench.board.leds();
+        leds.activity && leds.fault && leds.run
+    });
+    let all_lit = all_lit.count();
+    assert!((8..=12).contains(&all_lit), "{all_lit} of 20 times 50 ms");
+    bench.board.run_for(Time::from_secs(10));
+    assert!(!bench.board.leds().fault);
 }
 
 /// Code that leaves the crystal and the PLL running, as a boot loader may, and branches to the image: HSE on, the PLL
@@ -144,10 +135,7 @@ fn boot_loader(entry: u32) -> Vec<u8> {
 #[ignore = "needs the image: cargo xtask test"]
 fn image_entered_with_the_pll_running_waits_until_the_pll_has_stopped() {
     const LOADER: u32 = 0x2000_4800;
-    let mut bench = Bench::cold(Config {
-        chip: sim::chip::Config::holding(flash_with(Module::Di4)),
-        ..Config::default()
-    });
+    let mut bench = Bench::cold(config(Module::Di4, &[]));
     let entry = bench.board.word(0x0800_0004).unwrap() & !1;
     bench
         .board
@@ -167,12 +155,7 @@ fn lsi_ms(milliseconds: u64) -> Time {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn start_that_hangs_is_reset_by_the_watchdog() {
-    let cold = || {
-        Bench::cold(Config {
-            chip: sim::chip::Config::holding(flash_with(Module::Di4)),
-            ..Config::default()
-        })
-    };
+    let cold = || Bench::cold(config(Module::Di4, &[]));
     // When the clock changes, the crystal has just started. Before that the stack has been painted and the watchdog has
     // its settings.
     let mut rehearsal = cold();

@@ -4,7 +4,7 @@ use sim::line::Received;
 use sim::{Board, Bus, Config, Module, Time};
 
 use crate::LAYOUT;
-use crate::bench::{FIRST, adu, corner, flash_with, image};
+use crate::bench::{FIRST, adu, config, corner, image};
 
 /// Returns boards with these switches on one bus, with time to start.
 fn bus(dips: impl IntoIterator<Item = u8>) -> Bus {
@@ -15,16 +15,12 @@ fn bus(dips: impl IntoIterator<Item = u8>) -> Bus {
 }
 
 fn board(dip: u8) -> Board {
-    let config = Config {
+    let mut config = Config {
         dip,
-        module: Module::Di4,
         layout: LAYOUT,
-        chip: sim::chip::Config {
-            corner: corner(),
-            ..sim::chip::Config::holding(flash_with(Module::Di4))
-        },
-        ..Config::default()
+        ..config(Module::Di4, &[])
     };
+    config.chip.corner = corner();
     Board::new(image(), config).expect("the image fits")
 }
 

@@ -2,9 +2,9 @@
 //!
 //! Every frequency is that of the oscillator at the corner.
 
-use sim::{Config, Module, Time};
+use sim::{Module, Time};
 
-use crate::bench::{Bench, MODULE, SLOT, adu, flash_with_settings, format, on_crystal, on_hsi};
+use crate::bench::{Bench, SLOT, adu, config, format, on_crystal, on_hsi};
 
 /// Status bit: the unit runs on the internal oscillator.
 const INTERNAL: u16 = 1 << 6;
@@ -13,15 +13,9 @@ const INTERNAL: u16 = 1 << 6;
 const CRYSTAL: u16 = 4;
 
 fn without_crystal(settings: &[(u16, u16)]) -> Bench {
-    let flash = flash_with_settings(&[&[(MODULE, 2)], settings].concat());
-    Bench::with(Config {
-        chip: sim::chip::Config {
-            crystal: false,
-            ..sim::chip::Config::holding(flash)
-        },
-        module: Module::Do4,
-        ..Config::default()
-    })
+    let mut config = config(Module::Do4, settings);
+    config.chip.crystal = false;
+    Bench::with(config)
 }
 
 /// Asserts that the unit's bits have the right length: within half a percent over the last ten characters of a reply.

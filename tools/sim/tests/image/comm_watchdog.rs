@@ -175,18 +175,6 @@ fn time_out_of_zero_never_trips_and_a_new_time_out_is_in_force_immediately() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn watchdog_trips_without_any_request_since_power_on() {
-    let stored = [(COMM_TIMEOUT, 5), (0x01E0 + SLOT, 1), (SAFE + SLOT + 1, 1)];
-    let mut bench = Bench::set_up(Module::Do4, &stored);
-    bench.power_cycle();
-    assert_eq!(outputs(&bench), [true, false, false, false], "START");
-    bench.board.run_for(Time::from_ms(400));
-    assert_eq!(outputs(&bench), [false, true, false, false], "SAFE");
-    assert!(bench.status(TRIPPED));
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
 fn watchdog_counts_from_the_end_of_an_ascii_request() {
     let settings = [(MODE, 1), (FRAME_GAP, 500), (COMM_TIMEOUT, 2)];
     let mut bench = Bench::set_up(Module::Do4, &settings);

@@ -4,7 +4,7 @@
 use sim::{Board, Config, Corner, Finding, Module, Time, line::Received};
 
 use crate::LAYOUT;
-use crate::bench::{Bench, FIRST, adu, corner, flash_with, image};
+use crate::bench::{Bench, FIRST, adu, config, corner, image};
 
 /// Number of boards that are made to find a used core: other tests of this process may take the core that was left.
 const TRIES: usize = 1_000;
@@ -44,14 +44,10 @@ impl State {
     }
 }
 
-fn config(new_core: bool) -> Config {
-    Config {
-        chip: sim::chip::Config {
-            new_core,
-            ..sim::chip::Config::holding(flash_with(Module::Di4))
-        },
-        ..Config::default()
-    }
+fn with_core(new_core: bool) -> Config {
+    let mut config = config(Module::Di4, &[]);
+    config.chip.new_core = new_core;
+    config
 }
 
 /// Runs a start, requests, a save, a power cut during a save, and a reset. Returns the board's state at many instants.
@@ -103,7 +99,7 @@ fn leave_a_core(left: usize) {
         layout: LAYOUT,
         dip: 0xFF,
         module: Module::Ao4,
-        ..config(false)
+        ..with_core(false)
     };
     config.chip.corner = corner;
     config.chip.crystal = left.is_multiple_of(2);
@@ -122,7 +118,7 @@ fn leave_a_core(left: usize) {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn the_run_is_the_same_on_a_new_core_and_on_one_that_another_board_has_used() {
-    let new = Bench::cold(config(true));
+    let new = Bench::cold(with_core(true));
     assert!(!new.board.core_is_used());
     let expected = run(new);
     let traffic = expected
@@ -133,7 +129,7 @@ fn the_run_is_the_same_on_a_new_core_and_on_one_that_another_board_has_used() {
     let mut compared = 0;
     for left in 0..TRIES {
         leave_a_core(left);
-        let bench = Bench::cold(config(false));
+        let bench = Bench::cold(with_core(false));
         if !bench.board.core_is_used() {
             continue;
         }

@@ -3,7 +3,7 @@
 use sim::line::{Format, Settings};
 use sim::{Config, Module, Time};
 
-use crate::bench::{Bench, FIRST, flash_with};
+use crate::bench::{Bench, FIRST, config};
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
@@ -70,8 +70,7 @@ fn the_switch_is_read_only_at_power_on() {
 fn switch_that_bounces_at_power_on_is_read_once_it_is_stable() {
     let mut bench = Bench::cold(Config {
         dip: 17,
-        chip: sim::chip::Config::holding(flash_with(Module::Di4)),
-        ..Config::default()
+        ..config(Module::Di4, &[])
     });
     for (until_ms, dip) in [(4, 17), (9, 19), (10, 17), (12, 19), (15, 17), (18, 16)] {
         bench.board.set_dip(dip);
@@ -87,8 +86,7 @@ fn switch_that_bounces_at_power_on_is_read_once_it_is_stable() {
 fn switch_that_never_is_stable_does_not_keep_the_unit_from_starting() {
     let mut bench = Bench::cold(Config {
         dip: 17,
-        chip: sim::chip::Config::holding(flash_with(Module::Di4)),
-        ..Config::default()
+        ..config(Module::Di4, &[])
     });
     while bench.board.now() < Time::from_ms(150) {
         let even = (bench.board.now().as_us() / 2_000).is_multiple_of(2);

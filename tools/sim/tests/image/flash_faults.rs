@@ -1,8 +1,8 @@
 //! Flash operations on a part at its limits: a late BSY, a missing EOP, a supply voltage that is too low.
 
-use sim::{Config, Module, Time};
+use sim::{Module, Time};
 
-use crate::bench::{Bench, GOOD_MV, LOW_MV, MODULE, SLOT, adu, flash_with_settings};
+use crate::bench::{Bench, GOOD_MV, LOW_MV, SLOT, adu, config};
 
 const FILTER: u16 = 0x0120 + SLOT;
 const UNSAVED: u16 = 8;
@@ -100,10 +100,7 @@ fn save_pauses_when_the_supply_falls_between_two_operations() {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn start_with_a_low_supply_serves_and_changes_no_flash() {
-    let mut bench = Bench::cold(Config {
-        chip: sim::chip::Config::holding(flash_with_settings(&[(MODULE, 1)])),
-        ..Config::default()
-    });
+    let mut bench = Bench::cold(config(Module::Di4, &[]));
     bench.board.set_supply_mv(LOW_MV).unwrap();
     let operations = bench.board.flash_operations();
     bench.board.run_for(Time::from_ms(150));

@@ -9,7 +9,6 @@ const BAUD: u16 = 0x0101;
 const FORMAT: u16 = 0x0102;
 const RESPONSE_DELAY: u16 = 0x0105;
 const FRAME_GAP: u16 = 0x0106;
-const STRICT_T15: u16 = 0x0107;
 
 /// Returns the time from the end of the request to the start of the reply to a read.
 fn turnaround(bench: &mut Bench) -> Time {
@@ -22,22 +21,6 @@ fn turnaround(bench: &mut Bench) -> Time {
 /// Asserts that `at` is at `due` or up to `slack` later.
 fn assert_at(at: Time, due: Time, slack: Time) {
     assert!(at >= due && at <= due + slack, "{at:?}, due at {due:?}");
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn no_byte_of_many_long_requests_is_lost_at_115200_and_921600() {
-    for baud in [1152, 9216] {
-        let mut bench = Bench::set_up(Module::Di4, &[(BAUD, baud)]);
-        bench.unlock();
-        for n in 0..100 {
-            let values: Vec<u16> = (0..32).map(|i| (n + i) % 1001).collect();
-            bench.write(0x0120, &values).unwrap();
-            assert_eq!(bench.registers(0x0120, 32), Ok(values));
-        }
-        assert_eq!(bench.register(0x0237), 0, "no overrun");
-        assert_eq!(bench.register(0x0231), 0, "no error");
-    }
 }
 
 /// Sends a read with a pause of `gap` in its middle. Returns whether the unit answers.
@@ -138,28 +121,4 @@ fn delayed_response_is_dropped_when_other_traffic_has_begun() {
         assert_eq!(answers, answered, "{} bytes", other.len());
         bench.assert_answers(1);
     }
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn gaps_above_t15_are_counted_or_invalidate_the_frame() {
-    let mut bench = Bench::set_up(Module::Di4, &[]);
-    bench.tolerant = true;
-    // Silences between characters: of one character, and of nearly two and a half.
-    let (within, between) = (bench.characters(1), bench.bit() * 27);
-    assert!(answered_with_gap(&mut bench, within));
-    assert_eq!(bench.register(0x0238), 0);
-    assert!(answered_with_gap(&mut bench, between));
-    assert_eq!(bench.register(0x0238), 1, "counted");
-    bench.configure(STRICT_T15, &[1]);
-    bench.save();
-    assert!(
-        answered_with_gap(&mut bench, between),
-        "the gap was refused before the restart"
-    );
-    bench.restart();
-    assert!(answered_with_gap(&mut bench, within));
-    assert!(!answered_with_gap(&mut bench, between), "dropped");
-    bench.assert_answers(1);
-    assert_eq!(bench.register(0x0238), 1, "the gap was not counted");
 }

@@ -12,8 +12,8 @@
 //! | a board and its master | `bench`, `registers` |
 //! | the description | `self_description` |
 //! | the line | `noise`, `pulses`, `timing`, `silences`, `dip`, `bus` |
-//! | points | `points`, `analog_inputs`, `analog_outputs`, `dac_faults`, `counters`, `identify` |
-//! | configuration | `lock`, `in_force`, `module_choice`, `storing`, `saving`, `save_budget`, `flash_faults`, `power_cut` |
+//! | points | `points`, `analog_inputs`, `analog_outputs`, `dac_faults`, `counters` |
+//! | configuration | `in_force`, `storing`, `saving`, `save_budget`, `flash_faults`, `power_cut` |
 //! | the simulator | `cores`: boards of one process share translated code |
 //! | the radio | `radio`, `air` |
 //! | the loader | `loading` |
@@ -41,14 +41,11 @@ mod dip;
 mod faults;
 mod flash_faults;
 mod hung_task;
-mod identify;
 mod in_force;
 mod kept;
 mod loading;
-mod lock;
 mod log;
 mod long_run;
-mod module_choice;
 mod noise;
 mod outputs_at_start;
 mod points;

@@ -9,7 +9,7 @@ use sim::line::{Direction, Settings};
 use sim::radio::Parameters;
 use sim::{Config, Module, Time};
 
-use crate::bench::{Bench, MODULE, adu, ascii, flash_with_settings};
+use crate::bench::{Bench, adu, ascii, config};
 use crate::saving::{SLOWEST, large};
 use crate::self_description::request;
 
@@ -47,7 +47,6 @@ struct Loaded {
 impl Loaded {
     fn new(baud: Baud, is_ascii: bool) -> Self {
         let settings = [
-            (MODULE, Module::Ai2Ao2.code()),
             (configuration::BAUD, baud.code()),
             (configuration::MODE, is_ascii.into()),
             (LORA, 1),
@@ -55,12 +54,8 @@ impl Loaded {
             (LORA_FRAME_GAP, 50),
         ];
         let mut bench = Bench::with(Config {
-            module: Module::Ai2Ao2,
-            chip: sim::chip::Config::holding(flash_with_settings(
-                &[&settings, &large()[..]].concat(),
-            )),
             radio: Some(Parameters::FACTORY),
-            ..Config::default()
+            ..config(Module::Ai2Ao2, &[&settings, &large()[..]].concat())
         });
         bench.settings(Settings {
             baud: baud.bits_per_second(),

@@ -279,25 +279,6 @@ fn any_bit_of_the_other_registers_may_change_at_any_instant() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn line_that_is_set_up_again_is_counted_and_logged() {
-    let mut bench = Bench::new(Module::Di4, 1);
-    bench.tolerant = true;
-    let repairs = |bench: &mut Bench| {
-        let [high, low] = fault::LINE_REPAIRS.to_be_bytes();
-        bench.ask(1, &[3, high, low, 0, 1])
-    };
-    assert_eq!(repairs(&mut bench), Some(vec![3, 2, 0, 0]));
-    bench.board.take_log();
-    // Set BRR to another rate.
-    bench.board.upset(Block::Usart1, 0x08, 0x0400);
-    bench.board.run_for(Time::from_ms(100));
-    assert_eq!(repairs(&mut bench), Some(vec![3, 2, 0, 1]));
-    let log = bench.board.take_log();
-    assert!(log.contains("line: set up again"), "{log}");
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
 fn a_reply_whose_end_is_never_reported_is_cut_off() {
     for baud in [Baud::B9600, Baud::B115200, Baud::B921600] {
         let mut bench = Bench::set_up(Module::Di4, &[(configuration::BAUD, baud.code())]);

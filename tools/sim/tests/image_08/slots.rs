@@ -44,19 +44,6 @@ fn four_different_modules_answer_side_by_side() {
         }
         assert_eq!(words[4..], [1, 20, 300, 4000]);
     }
-    // A span must have one kind of points and lie in slots.
-    for (function, start, count) in [
-        (1, 7, 2),
-        (1, 0, 9),
-        (1, 8, 1),
-        (3, 7, 2),
-        (3, 8, 9),
-        (3, 0, 1),
-    ] {
-        let [[a, b], [c, d]] = [start, count as u16].map(u16::to_be_bytes);
-        let request = [function, a, b, c, d];
-        assert_eq!(bench.request(&request), Err(2), "{request:?}");
-    }
     // A write that includes an input point changes nothing.
     assert_eq!(bench.write_bits(3, &[true; 5]), Err(2));
     assert_eq!(bench.write(0x0B, &[7; 5]), Err(2));
@@ -137,21 +124,4 @@ fn saved_modules_are_in_force_after_the_restart() {
     bench.power_cycle();
     assert_eq!(bench.registers(IN_FORCE, 4), Ok(vec![2, 4, 5, 3]));
     assert_eq!(bench.register(0x0120), 149);
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn a_missing_module_does_not_affect_the_other_slots() {
-    let mut bench = fitted([Module::Ao4, Module::Do4, Module::Ai4, Module::Di4], &[]);
-    plug(
-        &mut bench,
-        [Module::None, Module::Do4, Module::None, Module::Di4],
-    );
-    bench.board.run_for(Time::from_ms(500));
-    assert_eq!(bench.write(0, &[1]), Err(4), "the DAC is missing");
-    assert_eq!(bench.registers(STATE, 1), Ok(vec![2]));
-    bench.write_bits(4, &[true; 4]).unwrap();
-    bench.board.run_for(Time::from_ms(5));
-    assert_eq!(outputs(&bench, 2), [true; 4]);
-    assert_eq!(bench.bits(2, 0x0C, 4), Ok(vec![false; 4]));
 }

@@ -123,15 +123,8 @@ pub struct Adc {
 }
 
 impl Default for Adc {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl Adc {
     /// Returns a converter out of reset, without a clock, its pins at 0 V.
-    #[must_use]
-    pub fn new() -> Self {
+    fn default() -> Self {
         let mut levels = [0; CHANNELS];
         levels[TEMPERATURE] = TEMPERATURE_MV;
         levels[REFERENCE] = REFERENCE_MV;
@@ -156,7 +149,9 @@ impl Adc {
             random: 0x6D6F_6469,
         }
     }
+}
 
+impl Adc {
     /// Adds an error of up to `lsb` either way to every conversion from now on. The errors are the same in every run.
     pub fn set_noise(&mut self, lsb: u16) {
         self.noise = lsb;
@@ -411,7 +406,7 @@ impl Peripheral for Adc {
             random: self.random,
             source_ohms: self.source_ohms,
             held: self.held,
-            ..Self::new()
+            ..Self::default()
         };
     }
 

@@ -11,7 +11,7 @@ fn cycles(n: u64) -> Time {
 
 /// On, settled and calibrated, at 12 MHz (72 MHz / 6).
 fn settled() -> (Adc, Time) {
-    let mut adc = Adc::new();
+    let mut adc = Adc::default();
     adc.set_clock(HZ, Time::ZERO);
     adc.write(offset::CR2, ON, Time::ZERO).expect("modelled");
     write(&mut adc, offset::CR2, ON | cr2::CAL, Time::from_us(2));
@@ -141,7 +141,7 @@ fn internal_channels_have_their_typical_values() {
 
 #[test]
 fn misuse_is_reported() {
-    let mut adc = Adc::new();
+    let mut adc = Adc::default();
     adc.set_clock(18_000_000, Time::ZERO);
     let now = Time::from_us(10);
     assert!(adc.write(offset::CR2, cr2::SWSTART, now).is_err(), "off");
@@ -170,7 +170,7 @@ fn misuse_is_reported() {
 
 #[test]
 fn codes_are_off_until_a_calibration_is_complete_and_after_each_power_up() {
-    let mut adc = Adc::new();
+    let mut adc = Adc::default();
     adc.set_clock(HZ, Time::ZERO);
     adc.set_millivolts(0, 1650, Time::ZERO);
     write(&mut adc, offset::CR2, ON, Time::ZERO);
@@ -193,7 +193,7 @@ fn codes_are_off_until_a_calibration_is_complete_and_after_each_power_up() {
 
 #[test]
 fn conversion_within_the_settling_time_is_too_low() {
-    let mut adc = Adc::new();
+    let mut adc = Adc::default();
     adc.set_clock(HZ, Time::ZERO);
     adc.set_millivolts(0, 1650, Time::ZERO);
     write(&mut adc, offset::CR2, ON, Time::ZERO);

@@ -7,11 +7,22 @@ use crate::part::{STM32F103CB, STM32F103RC};
 const NOW: Time = Time::ZERO;
 const SEED: u64 = 7;
 
-fn open() -> Flash {
-    let mut flash = Flash::new(&STM32F103CB, u32::MAX, SEED);
+fn unlock(flash: &mut Flash) {
     for key in KEYS {
         flash.write(4, key, NOW).unwrap();
     }
+}
+
+/// Starts to erase the page at `offset`.
+fn erase(flash: &mut Flash, offset: u32, now: Time) {
+    flash.write(0x10, CR_PER, now).unwrap();
+    flash.write(0x14, FLASH_BASE + offset, now).unwrap();
+    flash.write(0x10, CR_PER | CR_STRT, now).unwrap();
+}
+
+fn open() -> Flash {
+    let mut flash = Flash::new(&STM32F103CB, u32::MAX, SEED);
+    unlock(&mut flash);
     assert_eq!(flash.read(0x10, NOW), Ok(0));
     flash
 }
@@ -86,14 +97,10 @@ fn a_wrong_key_locks_until_reset() {
     let mut flash = Flash::new(&STM32F103CB, u32::MAX, SEED);
     flash.write(4, KEYS[1], NOW).unwrap();
     assert!(flash.take_complaint().unwrap().bus_error);
-    for key in KEYS {
-        flash.write(4, key, NOW).unwrap();
-    }
+    unlock(&mut flash);
     assert_eq!(flash.read(0x10, NOW), Ok(CR_LOCK));
     flash.reset(NOW);
-    for key in KEYS {
-        flash.write(4, key, NOW).unwrap();
-    }
+    unlock(&mut flash);
     assert_eq!(flash.read(0x10, NOW), Ok(0));
 }
 
@@ -101,9 +108,7 @@ fn a_wrong_key_locks_until_reset() {
 fn an_erase_takes_30_ms_and_only_its_page() {
     let mut flash = open();
     flash.bytes_mut().fill(0);
-    flash.write(0x10, CR_PER, NOW).unwrap();
-    flash.write(0x14, FLASH_BASE + 0x800, NOW).unwrap();
-    flash.write(0x10, CR_PER | CR_STRT, NOW).unwrap();
+    erase(&mut flash, 0x800, NOW);
     assert_eq!(flash.next_event(), Some(Time::from_ms(30)));
     flash.advance(Time::from_ms(30));
     assert!(flash.bytes()[0x800..0xC00].iter().all(|&b| b == 0xFF));
@@ -115,9 +120,7 @@ fn a_torn_erase_is_between_old_and_new_and_grows() {
     let torn_at = |ms| {
         let mut flash = open();
         flash.bytes_mut()[..1024].fill(0);
-        flash.write(0x10, CR_PER, NOW).unwrap();
-        flash.write(0x14, FLASH_BASE, NOW).unwrap();
-        flash.write(0x10, CR_PER | CR_STRT, NOW).unwrap();
+        erase(&mut flash, 0, NOW);
         flash.power_off(Time::from_ms(ms));
         assert_eq!(flash.next_event(), None);
         flash.bytes()[..1024].to_vec()
@@ -136,14 +139,10 @@ fn a_torn_erase_is_between_old_and_new_and_grows() {
 /// Returns the half-word at 0 after a program of 0 that was cut when half of it was done.
 fn torn_half(seed: u64) -> Flash {
     let mut flash = Flash::new(&STM32F103CB, u32::MAX, seed);
-    for key in KEYS {
-        flash.write(4, key, NOW).unwrap();
-    }
+    unlock(&mut flash);
     program(&mut flash, 0, 0);
     flash.power_off(Time::from_ns(26_250));
-    for key in KEYS {
-        flash.write(4, key, NOW).unwrap();
-    }
+    unlock(&mut flash);
     flash
 }
 
@@ -183,16 +182,12 @@ fn complete_program_steadies_only_the_cells_it_programs() {
 fn half_erased_cells_stay_unsteady_over_a_reset_until_an_erase_is_complete() {
     let mut flash = open();
     flash.bytes_mut()[..1024].fill(0);
-    let erase = |flash: &mut Flash| {
-        for key in KEYS {
-            flash.write(4, key, NOW).unwrap();
-        }
-        flash.write(0x10, CR_PER, NOW).unwrap();
-        flash.write(0x14, FLASH_BASE, NOW).unwrap();
-        flash.write(0x10, CR_PER | CR_STRT, NOW).unwrap();
+    let unlock_and_erase = |flash: &mut Flash| {
+        unlock(flash);
+        erase(flash, 0, NOW);
     };
     flash.reset(NOW);
-    erase(&mut flash);
+    unlock_and_erase(&mut flash);
     flash.reset(Time::from_ms(15));
     let words = |flash: &mut Flash| -> Vec<u32> {
         (0..256).map(|word| flash.read_word(4 * word)).collect()
@@ -201,7 +196,7 @@ fn half_erased_cells_stay_unsteady_over_a_reset_until_an_erase_is_complete() {
     assert!(flash.is_unsteady(0..1024));
     flash.reset(NOW);
     assert_ne!(words(&mut flash), words(&mut flash));
-    erase(&mut flash);
+    unlock_and_erase(&mut flash);
     flash.advance(Time::from_ms(30));
     assert_eq!(words(&mut flash), [u32::MAX; 256]);
     assert!(!flash.is_unsteady(0..1024));
@@ -221,9 +216,7 @@ fn torn_can_be_set_to_nothing_or_everything() {
 #[test]
 fn protected_pages_refuse_and_bytes_are_a_bus_error() {
     let mut flash = Flash::new(&STM32F103CB, !1, SEED);
-    for key in KEYS {
-        flash.write(4, key, NOW).unwrap();
-    }
+    unlock(&mut flash);
     program(&mut flash, 0, 0);
     assert_eq!(flash.read(0x0C, NOW), Ok(SR_WRPRTERR));
     flash.program(0x4000, false, 0, NOW);
@@ -258,9 +251,7 @@ fn mass_erase_clears_every_page_and_none_when_one_is_protected() {
     for (wrpr, status) in [(u32::MAX, SR_BSY), (!1, SR_WRPRTERR)] {
         let mut flash = Flash::new(&STM32F103CB, wrpr, SEED);
         flash.bytes_mut().fill(0);
-        for key in KEYS {
-            flash.write(4, key, NOW).unwrap();
-        }
+        unlock(&mut flash);
         flash.write(0x10, CR_MER, NOW).unwrap();
         flash.write(0x10, CR_MER | CR_STRT, NOW).unwrap();
         let _ = flash.read(0x0C, NOW);
@@ -297,13 +288,9 @@ impl Flash {
 fn a_high_density_part_erases_and_protects_pages_of_2_kib() {
     let mut flash = Flash::new(&STM32F103RC, !2, SEED);
     flash.bytes_mut().fill(0);
-    for key in KEYS {
-        flash.write(4, key, NOW).unwrap();
-    }
+    unlock(&mut flash);
     let mut erase = |offset: u32, now: Time| {
-        flash.write(0x10, CR_PER, now).unwrap();
-        flash.write(0x14, FLASH_BASE + offset, now).unwrap();
-        flash.write(0x10, CR_PER | CR_STRT, now).unwrap();
+        erase(&mut flash, offset, now);
         flash.advance(now + Time::from_ms(30));
         let status = flash.read(0x0C, now).unwrap();
         flash.write(0x0C, status, now).unwrap();

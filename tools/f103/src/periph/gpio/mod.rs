@@ -199,11 +199,6 @@ impl Gpio {
         &self.edges[pin]
     }
 
-    /// Removes the power: the part no longer drives its outputs.
-    pub fn power_off(&mut self, now: Time) {
-        self.reset(now);
-    }
-
     /// Calculates the levels again.
     fn settle(&mut self, now: Time) {
         let Modes {

@@ -69,15 +69,8 @@ pub struct I2c {
 }
 
 impl Default for I2c {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl I2c {
     /// Returns a block after reset, without a clock.
-    #[must_use]
-    pub fn new() -> Self {
+    fn default() -> Self {
         Self {
             hz: 0,
             cr1: 0,
@@ -102,7 +95,9 @@ impl I2c {
             connected: false,
         }
     }
+}
 
+impl I2c {
     /// Sets whether both pins are in alternate open drain from `now` on.
     pub fn set_connected(&mut self, connected: bool, now: Time) {
         self.connected = connected;
@@ -321,7 +316,7 @@ impl I2c {
             filters: self.filters,
             latched: self.filters != Wires::FREE,
             connected: self.connected,
-            ..Self::new()
+            ..Self::default()
         };
     }
 }

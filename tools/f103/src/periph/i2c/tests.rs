@@ -56,7 +56,7 @@ impl Bench {
     /// 400 kHz from 36 MHz: CCR = 30, three cycles each: 2.5 us a bit.
     fn new() -> Self {
         let mut bench = Self {
-            i2c: I2c::new(),
+            i2c: I2c::default(),
             device: Device {
                 present: true,
                 received: Vec::new(),

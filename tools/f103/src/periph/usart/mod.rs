@@ -81,15 +81,8 @@ pub struct Usart {
 }
 
 impl Default for Usart {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl Usart {
     /// Returns a USART after reset, without a clock.
-    #[must_use]
-    pub fn new() -> Self {
+    fn default() -> Self {
         Self {
             sr: sr::RESET,
             shown: 0,
@@ -110,7 +103,9 @@ impl Usart {
             baud_since: Time::ZERO,
         }
     }
+}
 
+impl Usart {
     /// Returns the number of writes to the data register since the last reset, with those that were lost.
     #[must_use]
     pub const fn data_writes(&self) -> u64 {
@@ -376,7 +371,7 @@ impl Peripheral for Usart {
             tx: Transmitter::with_sent(sent),
             rx_pin: Wave::new(self.rx_pin.last_level()),
             last_edges: self.last_edges,
-            ..Self::new()
+            ..Self::default()
         };
     }
 

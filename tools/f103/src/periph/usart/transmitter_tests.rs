@@ -19,7 +19,7 @@ fn cycles(n: u64) -> Time {
 }
 
 fn transmitter(cr1: u32, cr2: u32) -> Usart {
-    let mut usart = Usart::new();
+    let mut usart = Usart::default();
     usart.set_clock(HZ, Time::ZERO);
     write(&mut usart, offset::BRR, BRR, Time::ZERO);
     write(&mut usart, offset::CR2, cr2, Time::ZERO);
@@ -220,7 +220,7 @@ fn features_not_modelled_are_reported() {
         );
     }
     assert!(usart.read(0x1C, Time::ZERO).is_err());
-    let mut unset = Usart::new();
+    let mut unset = Usart::default();
     unset.set_clock(HZ, Time::ZERO);
     assert!(unset.write(offset::CR1, ON, Time::ZERO).is_err(), "BRR = 0");
 }

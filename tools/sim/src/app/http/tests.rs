@@ -7,7 +7,6 @@ use std::sync::mpsc;
 use serde_json::json;
 
 use super::*;
-use crate::app::testing::IN_USE;
 
 fn server() -> (SocketAddr, broadcast::Sender<Note>) {
     server_with(connections::PATIENCE)
@@ -206,13 +205,17 @@ fn connection_without_a_complete_request_is_closed_after_a_time() {
     assert!(until_closed(kept).starts_with("HTTP/1.1 200"));
 }
 
+/// Connects and sends a request for a path.
+fn requesting(address: SocketAddr, path: &str) -> TcpStream {
+    let mut stream = TcpStream::connect(address).unwrap();
+    write!(stream, "GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n").unwrap();
+    stream
+}
+
 #[test]
 fn connection_whose_client_does_not_read_is_closed_after_a_time() {
     let (address, live) = server_with(Duration::from_millis(300));
-    let mut stream = TcpStream::connect(address).unwrap();
-    stream
-        .write_all(b"GET /api/events HTTP/1.1\r\nHost: localhost\r\n\r\n")
-        .unwrap();
+    let mut stream = requesting(address, "/api/events");
     let note = Note {
         board: None,
         name: "frame",
@@ -230,10 +233,7 @@ fn stream_of_events_above_the_limit_is_refused_and_other_requests_are_answered()
     let (address, live) = server();
     let streams: Vec<_> = (0..STREAMS)
         .map(|_| {
-            let mut stream = TcpStream::connect(address).unwrap();
-            stream
-                .write_all(b"GET /api/events HTTP/1.1\r\nHost: localhost\r\n\r\n")
-                .unwrap();
+            let mut stream = requesting(address, "/api/events");
             stream.read_exact(&mut [0; 12]).unwrap();
             stream
         })
@@ -253,10 +253,7 @@ fn requests_of_clients_that_disconnect_do_not_pile_up_in_the_queue() {
     let live = broadcast::Sender::new(1);
     let address = listen("127.0.0.1:0".parse().unwrap(), events, live).unwrap();
     for _ in 0..3 * connections::MOST {
-        let mut stream = TcpStream::connect(address).unwrap();
-        stream
-            .write_all(b"GET /api/state HTTP/1.1\r\nHost: localhost\r\n\r\n")
-            .unwrap();
+        let _stream = requesting(address, "/api/state");
         thread::sleep(Duration::from_millis(2));
     }
     let mut waiting = Vec::new();
@@ -273,10 +270,7 @@ fn requests_of_clients_that_disconnect_do_not_pile_up_in_the_queue() {
 #[test]
 fn event_stream_begins_with_the_state_and_continues_with_changes() {
     let (address, live) = server();
-    let mut stream = TcpStream::connect(address).unwrap();
-    stream
-        .write_all(b"GET /api/events HTTP/1.1\r\nHost: localhost\r\n\r\n")
-        .unwrap();
+    let mut stream = requesting(address, "/api/events");
     let mut received = String::new();
     let mut until = |end: &str| {
         let mut bytes = [0; 512];
@@ -318,13 +312,4 @@ fn stopping_simulator_answers_with_503() {
     let address = listen("127.0.0.1:0".parse().unwrap(), mpsc::channel().0, live).unwrap();
     let answer = read_state(address);
     assert!(answer.starts_with("HTTP/1.1 503"), "{answer}");
-}
-
-#[test]
-fn port_in_use_is_an_error_that_names_the_option() {
-    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
-    let address = taken.local_addr().unwrap();
-    let live = broadcast::Sender::new(1);
-    let text = listen(address, mpsc::channel().0, live).unwrap_err();
-    assert!(text.contains(IN_USE) && text.contains("--http"), "{text}");
 }

@@ -32,7 +32,7 @@ impl Bench {
     fn new() -> Self {
         let mut bench = Self {
             line: Line::default(),
-            usart: Usart::new(),
+            usart: Usart::default(),
             now: Time::ZERO,
         };
         bench.line.set_settings(Settings {

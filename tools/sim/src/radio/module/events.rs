@@ -101,7 +101,7 @@ impl Module {
             self.start();
             return;
         }
-        let answer = self.memory.carry_out(command, self.confirmation);
+        let answer = self.memory.carry_out(command);
         self.uart.send(self.now, answer);
     }
 
@@ -113,9 +113,7 @@ impl Module {
         {
             self.received += 1;
             let room = timing::BUFFER_BYTES.saturating_sub(self.uart.waiting(now));
-            let length = packet.bytes.len().min(room);
-            self.lost += (packet.bytes.len() - length) as u64;
-            let bytes = packet.bytes.into_iter().take(length);
+            let bytes = packet.bytes.into_iter().take(room);
             self.uart.send(now + timing::OUTPUT_DELAY, bytes);
         }
     }

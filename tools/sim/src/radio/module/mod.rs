@@ -3,7 +3,7 @@
 mod events;
 
 use super::antenna::Antenna;
-use super::command::{Command, Confirmation, Memory};
+use super::command::{Command, Memory};
 use super::packet::{News, Packet, Sender};
 use super::parameters::{Mode, Parameters, SLEEP_UART};
 use super::sending::Sending;
@@ -43,7 +43,6 @@ pub struct Module {
     /// The module is idle since this instant; `None` while it is not.
     idle_since: Option<Time>,
     memory: Memory,
-    confirmation: Confirmation,
     pub(super) uart: Uart,
     /// Bytes that may become a command, and when the UART has been silent after them.
     collected: Vec<u8>,
@@ -54,8 +53,6 @@ pub struct Module {
     antenna: Antenna,
     sent: u64,
     received: u64,
-    /// Number of bytes of packets that were lost because the buffer to TXD was full.
-    lost: u64,
     news: Vec<News>,
     /// Instant from which on the module uses fixed transmission; `None` if that was reported.
     unmodelled: Option<Time>,
@@ -76,7 +73,6 @@ impl Module {
             wanted_since: Time::ZERO,
             idle_since: None,
             memory: Memory::new(stored),
-            confirmation: Confirmation::default(),
             uart: Uart::default(),
             collected: Vec::new(),
             silent_at: Time::ZERO,
@@ -85,7 +81,6 @@ impl Module {
             antenna: Antenna::off(),
             sent: 0,
             received: 0,
-            lost: 0,
             news: Vec::new(),
             unmodelled: None,
             now: Time::ZERO,
@@ -133,12 +128,6 @@ impl Module {
         self.received
     }
 
-    /// Returns the number of bytes that were lost because one of the two buffers was full.
-    #[must_use]
-    pub const fn bytes_lost(&self) -> u64 {
-        self.sending.lost() + self.lost
-    }
-
     /// Returns the fault of the module.
     #[must_use]
     pub const fn fault(&self) -> Fault {
@@ -160,11 +149,6 @@ impl Module {
     /// Replaces the parameters that the module keeps without power. Those in force stay until its next start.
     pub fn set_stored(&mut self, stored: Parameters) {
         self.memory.stored = stored;
-    }
-
-    /// Chooses the answer of the module to the commands C0 and C2.
-    pub fn set_confirmation(&mut self, confirmation: Confirmation) {
-        self.confirmation = confirmation;
     }
 
     /// Returns how the module drives its pin AUX.

@@ -1,7 +1,7 @@
 //! Power, modes, commands, and faults.
 
 use super::host::{Host, ms, near};
-use crate::radio::{Confirmation, Fault, Mode, Parameters, timing};
+use crate::radio::{Fault, Mode, Parameters, timing};
 use f103::periph::gpio::Drive;
 use f103::periph::usart::Wire;
 use f103::serial::{Format, Settings};
@@ -46,8 +46,7 @@ fn parameters_are_read_and_stored_by_commands_in_sleep() {
     host.radio.module.set_power(true);
     host.run_for(timing::START_UP + ms(1));
     assert_eq!(host.command(&[0xC1; 3]), OTHER);
-    host.radio.module.set_confirmation(Confirmation::Text);
-    assert_eq!(host.command(&FACTORY), b"OK\r\n");
+    assert_eq!(host.command(&FACTORY), FACTORY);
     assert_eq!(host.module().stored(), Parameters::FACTORY);
 }
 

@@ -141,8 +141,7 @@ fn saves_do_not_disturb_requests_over_the_air() {
         bench.board.run_for(Time::from_ms(u64::from(round) * 9));
         bench.write(COMMAND, &[1]).unwrap();
         bench.board.run_for(Time::from_ms(400));
-        let reply = bench.air().take_received();
-        let reply: Vec<u8> = reply.iter().map(|byte| byte.byte).collect();
+        let reply = bench.take_from_the_air();
         assert_eq!(reply, adu(&[1, 1, 1, 0]), "round {round}");
         changed |= pages()
             .iter()
@@ -177,13 +176,7 @@ fn rs485_line_at_921600_loses_nothing_while_the_radio_is_busy() {
         }
         assert_eq!(bench.hurry(Time::ZERO, &echo).0, echo);
         if bench.air().received().count() == request.len() {
-            let received = bench.air().take_received();
-            assert!(
-                received
-                    .iter()
-                    .map(|byte| byte.byte)
-                    .eq(request.iter().copied())
-            );
+            assert_eq!(bench.take_from_the_air(), request);
             (replies, asked) = (replies + 1, false);
         }
     }

@@ -8,7 +8,7 @@ use sim::radio::{Parameters, timing};
 use sim::{Board, Bus, Config, Corner, Module, Time};
 
 use crate::LAYOUT;
-use crate::bench::{MODULE, adu, flash_with_settings, image};
+use crate::bench::{adu, config, image};
 use crate::radio::SET_UP;
 
 /// The rates of LORA_AIR_RATE in bit/s.
@@ -32,20 +32,14 @@ struct Air {
 impl Air {
     fn new(rate: u32, corner: Corner) -> Self {
         let code = RATES.iter().position(|each| *each == rate).expect("a rate") as u16;
-        let module = (MODULE, Module::Di4.code());
-        let flash = flash_with_settings(&[module, (LORA, 1), (LORA_AIR_RATE, code)]);
         let board = |dip| {
-            let config = Config {
+            let mut config = Config {
                 dip,
-                module: Module::Di4,
                 radio: Some(Parameters::FACTORY),
                 layout: LAYOUT,
-                chip: sim::chip::Config {
-                    corner,
-                    ..sim::chip::Config::holding(flash.clone())
-                },
-                ..Config::default()
+                ..config(Module::Di4, &[(LORA, 1), (LORA_AIR_RATE, code)])
             };
+            config.chip.corner = corner;
             Board::new(image(), config).expect("the image fits")
         };
         let mut bus = Bus::new([1, 2, 3].map(board).into());

@@ -24,8 +24,7 @@ impl Bench {
             assert!(self.board.now() < limit, "no reply");
             self.board.run_for(Time::from_ms(1));
         }
-        let reply = self.air().take_received();
-        assert!(reply.iter().map(|byte| byte.byte).eq(request));
+        assert_eq!(self.take_from_the_air(), request);
     }
 }
 
@@ -97,8 +96,7 @@ fn restart_during_a_reply_over_the_air_sends_nothing_else() {
             ready |= bench.board.resets() > before && bench.module().mode() == Some(Mode::Normal);
         }
         assert!(ready, "air rate {air_rate}");
-        let reply = bench.air().take_received();
-        let reply: Vec<u8> = reply.iter().map(|byte| byte.byte).collect();
+        let reply = bench.take_from_the_air();
         let sent = bench.packets_of_the_unit();
         let sent = sent.iter().map(|packet| &packet.bytes[..]);
         assert_eq!(

@@ -6,7 +6,7 @@ use register_map::{configuration::LORA, state};
 use sim::radio::{Packet, Parameters, Sender};
 use sim::{Config, Module, Time};
 
-use crate::bench::{Bench, FIRST, MODULE, adu, flash_with_settings};
+use crate::bench::{Bench, FIRST, adu, config};
 
 /// Time for the module's start and set-up: 500 ms for its own start, the rest for commands and changes of the mode.
 pub const SET_UP: Time = Time::from_ms(1_500);
@@ -17,12 +17,9 @@ const PAUSE: Time = Time::from_ms(700);
 
 /// A 4DI at unit address 1 with a radio module, before its set-up is complete.
 pub fn starting(module: Parameters, settings: &[(u16, u16)]) -> Bench {
-    let all = [&[(MODULE, Module::Di4.code()), (LORA, 1)], settings].concat();
     Bench::with(Config {
-        module: Module::Di4,
-        chip: sim::chip::Config::holding(flash_with_settings(&all)),
         radio: Some(module),
-        ..Config::default()
+        ..config(Module::Di4, &[&[(LORA, 1)], settings].concat())
     })
 }
 
@@ -54,6 +51,11 @@ impl Bench {
             self.board.run_for(Time::from_ms(20));
             last = self.air().received().next_back().map(|byte| byte.end);
         }
+        self.take_from_the_air()
+    }
+
+    /// Returns the bytes that the gateway has received since the last call.
+    pub fn take_from_the_air(&mut self) -> Vec<u8> {
         let received = self.air().take_received();
         received.iter().map(|byte| byte.byte).collect()
     }

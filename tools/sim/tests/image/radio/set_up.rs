@@ -8,7 +8,7 @@ use sim::radio::{Mode, Parameters};
 use sim::{Config, Module, Time};
 
 use super::{SET_UP, bench};
-use crate::bench::{Bench, FIRST, MODULE, flash_with_settings};
+use crate::bench::{Bench, FIRST, config};
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
@@ -55,9 +55,8 @@ fn settings_apply_after_a_save_and_a_restart() {
 #[ignore = "needs the image: cargo xtask test"]
 fn radio_that_is_off_leaves_its_pins_alone() {
     let mut bench = Bench::with(Config {
-        chip: sim::chip::Config::holding(flash_with_settings(&[(MODULE, Module::Di4.code())])),
         radio: Some(Parameters::FACTORY),
-        ..Config::default()
+        ..config(Module::Di4, &[])
     });
     bench.board.run_for(SET_UP);
     // The module's own pull-ups keep it in sleep.
@@ -71,12 +70,10 @@ fn radio_that_is_off_leaves_its_pins_alone() {
 #[ignore = "needs the image: cargo xtask test"]
 fn radio_is_off_in_recovery_mode_and_without_a_unit_address() {
     for dip in [255, 0, 248] {
-        let all = [(MODULE, Module::Di4.code()), (LORA, 1)];
         let mut bench = Bench::with(Config {
             dip,
-            chip: sim::chip::Config::holding(flash_with_settings(&all)),
             radio: Some(Parameters::FACTORY),
-            ..Config::default()
+            ..config(Module::Di4, &[(LORA, 1)])
         });
         bench.board.run_for(SET_UP);
         assert_eq!(bench.module().mode(), Some(Mode::Sleep), "DIP switch {dip}");
