@@ -1,5 +1,5 @@
-//! `cargo xtask build`: the release image, the loader, and the applications for the slots behind it, each as an ELF file
-//! for a debugger or the simulator and as a .bin for a programmer.
+//! `cargo xtask build`: the release image, as an ELF file for a debugger or the simulator and as a .bin for a
+//! programmer. For tests also the loader, and the applications for the slots behind it.
 
 use std::path::{Path, PathBuf};
 
@@ -58,20 +58,18 @@ impl Given {
 
 /// `cargo xtask build`.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
-    for elf in all(workspace, options.board)? {
-        say!("{}\n{}", elf.display(), elf.with_extension("bin").display());
-    }
+    let elf = image(workspace, options.board)?;
+    say!("{}\n{}", elf.display(), elf.with_extension("bin").display());
     Ok(())
 }
 
-/// Builds every program of a board, and returns their ELF files: the image that runs alone, the loader, and the
-/// application for both slots.
-pub fn all(workspace: &mut Workspace, board: &Board) -> Result<[PathBuf; 4]> {
-    let [a, b] = Slot::ALL;
-    let (a, b) = (slot(workspace, board, a)?, slot(workspace, board, b)?);
-    // Last, because the applications for the slots have the same name until they are copied.
-    let image = image(workspace, board)?;
-    Ok([image, loader(workspace, board)?, a, b])
+/// Builds every program of a board: the loader, the application for both slots, and the image that runs alone.
+pub fn all(workspace: &mut Workspace, board: &Board) -> Result<()> {
+    loader(workspace, board)?;
+    for slot in Slot::ALL {
+        self::slot(workspace, board, slot)?;
+    }
+    image(workspace, board).map(drop)
 }
 
 /// Builds the image, and returns its ELF file, with symbols and debug information.

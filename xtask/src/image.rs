@@ -82,27 +82,10 @@ pub fn symbols(elf: &Elf<'_>) -> Result<Vec<Symbol>> {
 }
 
 /// Refuses an image that can panic, or whose code in RAM uses flash.
-///
-/// Every panic of Rust calls a function of `core::panicking` or the panic handler, and the linker keeps only functions
-/// that something can call.
 pub fn check(bytes: &[u8]) -> Result<()> {
     let elf = parse(bytes)?;
     let symbols = symbols(&elf)?;
-    let functions = symbols.iter().filter(|symbol| symbol.function);
-    let mut functions: Vec<_> = functions.map(|symbol| demangled(&symbol.name)).collect();
-    ensure!(
-        !functions.is_empty(),
-        "the image has no symbols, so it is unknown whether it can panic"
-    );
-    functions.retain(|name| {
-        name.starts_with("core::panicking::") || name.ends_with("rust_begin_unwind")
-    });
-    ensure!(
-        functions.is_empty(),
-        "the image can panic, which a release image must not; remove the calls to {} (docs/architecture.md shows how \
-         to find them)",
-        functions.join(", ")
-    );
+    panics::check(&elf, &symbols)?;
     ram_code::check(&elf, &symbols)
 }
 
@@ -111,6 +94,7 @@ fn demangled(name: &str) -> String {
     format!("{:#}", rustc_demangle::demangle(name))
 }
 
+mod panics;
 mod ram_code;
 #[cfg(test)]
 pub mod sample;

@@ -57,9 +57,11 @@ struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Command {
-    /// Build the release image, the loader, and the application for both slots: ELF and .bin
+    /// Build the release image: ELF and .bin
     Build(build::Options),
     /// Build the images for both slots behind the loader, sign them, and write the file of an update
+    // Hidden until the application takes an update.
+    #[command(hide = true)]
     Image(signed::Options),
     /// Write the image into a board with probe-rs, verify and start it
     Flash(debug::Options),

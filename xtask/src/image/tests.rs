@@ -62,6 +62,32 @@ fn panicking_function_is_refused() {
     assert!(error_of(&[]).contains("no symbols"));
 }
 
+/// Returns the error of an image in which a function with this name calls `core::panicking::panic`.
+fn error_of_caller(name: &str) -> String {
+    // BL to the next function but one, and BX LR three times.
+    let mut data = vec![0x00, 0xF0, 0x02, 0xF8, 0x70, 0x47, 0x70, 0x47, 0x70, 0x47];
+    data.resize(16, 0);
+    let symbols = [
+        (name, FLASH_BASE | 1, 6),
+        ("core::panicking::panic", (FLASH_BASE + 8) | 1, 2),
+    ];
+    let segments = [code(FLASH_BASE, &data), code(RAM_BASE, &[0; 32])];
+    let checked = check(&elf(&segments, &symbols));
+    checked.map_or_else(|error| error.to_string(), |()| "none".to_owned())
+}
+
+#[test]
+fn only_the_crate_with_the_signatures_may_call_a_panicking_function() {
+    assert_eq!(error_of_caller("salty::hash::Sha512::update"), "none");
+    for name in [
+        "loader::main",
+        "core::slice::index::fail",
+        "pepper::salty::x",
+    ] {
+        assert!(error_of_caller(name).contains("can panic"), "{name}");
+    }
+}
+
 /// Returns what the function `user` in RAM uses, by the error of an image in which it consists of this code and these
 /// constants. The image has a function and a constant in flash.
 fn use_in_ram(code_of_user: &[u16], constants: &[u32]) -> Option<String> {
