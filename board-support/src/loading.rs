@@ -116,8 +116,7 @@ impl Loading {
         }
     }
 
-    /// Shows for ever that no image can be started: the fault LED is lit, and the running LED blinks five times a
-    /// second.
+    /// Shows that no image can be started: the fault LED is lit, and the running LED blinks five times a second.
     pub fn show_nothing(mut self) -> ! {
         set_up_ports(&mut self.rcc);
         let _fault = IoPin::high(Pin::b(9));

@@ -165,7 +165,7 @@ impl Journal {
         page: Page,
         offset: usize,
     ) -> Result<(), JournalError<F::Error>> {
-        // Every attempt has a number of its own, because its remains may read as a record later.
+        // Each attempt has another number, because its remains may read as a record later.
         self.number += 1;
         let halves = encoded(self.number, record);
         for (n, half) in halves.into_iter().enumerate() {

@@ -1,8 +1,8 @@
 //! The loader of a modio: chooses which of two images is started, and checks that a new one is genuine. It has no UART,
 //! no command and no protocol.
 //!
-//! [`decide`] has the decisions, [`genuine`] what an image must be. The loader runs on the internal oscillator and leaves
-//! everything as after a reset but the watchdog, which cannot be stopped.
+//! [`decide`] has the decisions, [`genuine`] what an image must be. The loader runs on the internal oscillator and
+//! leaves everything as after a reset but the watchdog, which cannot be stopped.
 
 #![no_std]
 #![no_main]

@@ -1,5 +1,5 @@
-//! Walks through every state of a unit that the loader's decisions and the application's orders can reach: every event in
-//! each, and a power cut between any two writes.
+//! Walks through every state of a unit that the loader's decisions and the application's orders can reach: every event
+//! in each, and a power cut between any two writes.
 //!
 //! A slot holds one of a few contents, and a record is written whole, because [`journal`](crate::journal) seals it.
 
@@ -175,7 +175,7 @@ impl Unit {
                     ..self
                 })
             }
-            Next::Reset => panic!("{self:?} resets for ever"),
+            Next::Reset => panic!("{self:?} does not start"),
             Next::Nothing => {
                 assert_eq!(self.record, None, "{self:?} starts nothing");
                 None
@@ -290,7 +290,7 @@ impl Unit {
         }
         let (slot, _) = unit.runs.unwrap();
         let state = unit.state(slot);
-        assert_eq!(state, Some(State::Confirmed), "starts for ever: {self:?}");
+        assert_eq!(state, Some(State::Confirmed), "is never left: {self:?}");
     }
 }
 

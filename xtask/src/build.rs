@@ -44,8 +44,8 @@ impl Given {
         self.options.board
     }
 
-    /// Returns the ELF file of the image, which is built unless the option names one. A file without an image is a usage
-    /// error.
+    /// Returns the ELF file of the image, which is built unless the option names one. A file without an image is a
+    /// usage error.
     pub fn elf(&self, workspace: &mut Workspace) -> Result<PathBuf> {
         let Some(elf) = &self.elf else {
             return image(workspace, self.board());
@@ -107,8 +107,8 @@ pub fn linked(
     program(workspace, board, ["firmware", "modio", board.name], map)
 }
 
-/// Builds a program for a board: its package, its name, and the features. Checks that it cannot panic and that its code in
-/// RAM needs no flash. Writes the flash from 0x0800_0000 on to a .bin.
+/// Builds a program for a board: its package, its name, and the features. Checks that it cannot panic and that its code
+/// in RAM needs no flash. Writes the flash from 0x0800_0000 on to a .bin.
 fn program(
     workspace: &mut Workspace,
     board: &Board,

@@ -152,9 +152,9 @@ fn run(cli: Cli) -> Result<()> {
         Command::Dist(options) => dist::run(workspace, &options),
         Command::Renode(options) => renode::run(workspace, &options),
         Command::Hil(PassedOn { arguments }) => {
-            // This program has all options and does everything, including writing the image, for which it calls
-            // `cargo xtask flash`. It replaces this process, so that it receives Ctrl-C and SIGTERM, restores the board,
-            // and sets the exit status.
+            // This program has all options and does everything, including writing the image, for which it calls `cargo
+            // xtask flash`. It replaces this process, so that it receives Ctrl-C and SIGTERM, restores the board, and
+            // sets the exit status.
             let program = workspace.program("modio-hil")?;
             command::exec(std::process::Command::new(program).args(arguments))
         }

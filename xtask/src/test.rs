@@ -320,7 +320,8 @@ fn sim_at(workspace: &mut Workspace, corner: &str) -> Result<()> {
 }
 
 /// Runs tests that run the images in the simulator, as an ordinary user: those of these targets whose names contain one
-/// of `names`, or all. Spaces separate targets and names. A name that begins with `--` is an option of the tests. The variables choose the corner of the part, and how long a test is.
+/// of `names`, or all. Spaces separate targets and names. A name that begins with `--` is an option of the tests. The
+/// variables choose the corner of the part, and how long a test is.
 pub fn simulated(
     workspace: &mut Workspace,
     targets: &str,

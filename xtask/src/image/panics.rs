@@ -7,12 +7,12 @@ use object::{Object as _, ObjectSection as _};
 
 use super::{Elf, Symbol, demangled};
 
-/// A crate whose panics are accepted: its indices are those of loops with constant bounds, which the compiler does not see
-/// through at this optimisation level. It is the only crate with cryptography that fits the loader.
+/// A crate whose panics are accepted: its indices are those of loops with constant bounds, which the compiler does not
+/// see through at this optimisation level. It is the only crate with cryptography that fits the loader.
 const ACCEPTED: &str = "salty::";
 
-/// Refuses an image in which a function can panic. Every panic of Rust calls a function of `core::panicking` or the panic
-/// handler, and the linker keeps only functions that something can call.
+/// Refuses an image in which a function can panic. Every panic of Rust calls a function of `core::panicking` or the
+/// panic handler, and the linker keeps only functions that something can call.
 pub fn check(elf: &Elf<'_>, symbols: &[Symbol]) -> Result<()> {
     let functions = symbols.iter().filter(|symbol| symbol.function);
     let functions: Vec<_> = functions
