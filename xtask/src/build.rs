@@ -90,9 +90,9 @@ pub fn slot(workspace: &mut Workspace, board: &Board, slot: Slot) -> Result<Path
     };
     let features = format!("{board},slot-{letter}");
     let (elf, _) = program(workspace, board, ["firmware", "modio", &features], None)?;
-    // The next build of the application has the same name.
+    // Leave no image for a slot under the name of the image that runs alone.
     let kept = elf.with_file_name(format!("modio-{letter}"));
-    fs::copy(&elf, &kept)?;
+    fs::rename(&elf, &kept)?;
     fs::rename(elf.with_extension("bin"), kept.with_extension("bin"))?;
     Ok(kept)
 }

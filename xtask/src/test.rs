@@ -329,10 +329,11 @@ pub fn simulated(
     variables: &[(&str, &str)],
 ) -> Result<()> {
     let ordinary = ordinary::words()?;
+    let loader = build::loader(workspace, &MODIO_02)?;
+    // First, because the application alone has the same name until it is built again.
+    let slots = signed::images(workspace, &signed::Options::of(&MODIO_02))?;
     let modio_02 = build::image(workspace, &MODIO_02)?;
     let modio_08 = build::image(workspace, &MODIO_08)?;
-    let loader = build::loader(workspace, &MODIO_02)?;
-    let slots = signed::images(workspace, &signed::Options::of(&MODIO_02))?;
     let simulator = workspace.simulator()?;
     let tests = |list: &[&str]| {
         let mut cargo = workspace.cargo("test");

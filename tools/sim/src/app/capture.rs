@@ -83,7 +83,7 @@ fn write(recorder: &mut Recorder<File>, frame: &Frame) -> io::Result<()> {
     }
     recorder.write(&Packet {
         time: Duration::from_nanos(frame.start.as_ns()),
-        direction: Some(frames::way(frame.direction)),
+        direction: Some(frame.direction),
         framing: Framing::on_line(&frame.bytes).unwrap_or_default(),
         bytes: &frame.bytes,
         comment: &comment,

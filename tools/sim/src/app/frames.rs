@@ -61,8 +61,8 @@ pub fn frame(frame: &Frame) -> OneFrame {
     OneFrame {
         number: frame.number,
         direction: match frame.direction {
-            Direction::FromMaster => Way::Rx,
-            Direction::FromUnit => Way::Tx,
+            Direction::Request => Way::Rx,
+            Direction::Response => Way::Tx,
         },
         start_us: frame.start.as_us(),
         end_us: frame.end.as_us(),
@@ -80,15 +80,7 @@ pub fn frame(frame: &Frame) -> OneFrame {
 pub fn summary(frame: &Frame) -> String {
     let framing = Framing::on_line(&frame.bytes).unwrap_or_default();
     let request = frame.request.as_deref();
-    decode::frame(framing, way(frame.direction), &frame.bytes, request)
-}
-
-/// Returns the direction of a frame, in the terms of the standard.
-pub fn way(direction: Direction) -> modbus_line::Direction {
-    match direction {
-        Direction::FromMaster => modbus_line::Direction::Request,
-        Direction::FromUnit => modbus_line::Direction::Response,
-    }
+    decode::frame(framing, frame.direction, &frame.bytes, request)
 }
 
 fn hex(bytes: &[u8]) -> String {
@@ -111,7 +103,7 @@ mod tests {
     fn frame_as_json_has_times_and_meaning() {
         let seen = Frame {
             number: 7,
-            direction: Direction::FromMaster,
+            direction: Direction::Request,
             start: Time::from_us(1500),
             end: Time::from_us(10_666),
             bytes: vec![0x01, 0x01, 0x00, 0x10, 0x00, 0x04, 0x3C, 0x0C],
@@ -142,7 +134,7 @@ mod tests {
     fn summary_of_a_reply_has_the_address_of_its_request_and_the_values() {
         let reply = Frame {
             number: 2,
-            direction: Direction::FromUnit,
+            direction: Direction::Response,
             start: Time::ZERO,
             end: Time::ZERO,
             bytes: Framing::Rtu.frame(0, 1, &[1, 1, 0x05]),

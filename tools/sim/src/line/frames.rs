@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use modbus_line::adu::Framing;
+use modbus_line::{Direction, adu::Framing};
 
 use f103::serial::Word;
 use f103::time::Time;
@@ -13,22 +13,13 @@ pub const KEPT: usize = 1000;
 /// Number of bytes after which a frame is cut, in case the line is never silent: sixteen times the longest RTU frame.
 pub const LONGEST: usize = 4096;
 
-/// Sender of a frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Direction {
-    /// The master, or noise.
-    FromMaster,
-    /// A unit.
-    FromUnit,
-}
-
 /// A frame on the line, as a receiver with the master's settings receives it. A frame consists of characters of one
 /// sender with less than t3.5 of silence between them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frame {
     /// Number of the frame on this line, from 1.
     pub number: u64,
-    /// Sender of the frame.
+    /// The master or noise sends requests, a unit responses.
     pub direction: Direction,
     /// Start of the first start bit.
     pub start: Time,
@@ -131,14 +122,14 @@ impl Record {
         self.last_end = Some(frame.end);
         self.last_number = frame.number;
         match frame.direction {
-            Direction::FromMaster => {
+            Direction::Request => {
                 self.from_master += 1;
                 if let Some((unit, pdu)) = opened {
                     // No unit answers a broadcast.
                     self.request = (unit != 0).then_some((unit, pdu, frame.end));
                 }
             }
-            Direction::FromUnit => {
+            Direction::Response => {
                 self.from_unit += 1;
                 let unit = opened.map(|(unit, _)| unit);
                 if let Some((asked, pdu, end)) = self.request.take()
@@ -182,14 +173,14 @@ mod tests {
         for (byte, n) in request.into_iter().zip(0..) {
             record.word(
                 &word(n * 110, u16::from(byte)),
-                Direction::FromMaster,
+                Direction::Request,
                 false,
                 SILENCE,
             );
         }
-        record.word(&word(880, 0x55), Direction::FromUnit, false, SILENCE);
-        record.word(&word(1329, 0x56), Direction::FromUnit, false, SILENCE);
-        record.word(&word(1779, 0x57), Direction::FromUnit, true, SILENCE);
+        record.word(&word(880, 0x55), Direction::Response, false, SILENCE);
+        record.word(&word(1329, 0x56), Direction::Response, false, SILENCE);
+        record.word(&word(1779, 0x57), Direction::Response, true, SILENCE);
         record.quiet(Time::from_us(2228), SILENCE);
         assert_eq!(record.frames().count(), 2);
         record.quiet(Time::from_us(2229), SILENCE);
@@ -209,7 +200,7 @@ mod tests {
     fn only_the_last_frames_are_kept_with_their_numbers() {
         let mut record = Record::default();
         for n in 0..1200 {
-            record.word(&word(n * 1000, 1), Direction::FromMaster, false, SILENCE);
+            record.word(&word(n * 1000, 1), Direction::Request, false, SILENCE);
         }
         record.quiet(Time::from_secs(2), SILENCE);
         let numbers: Vec<_> = record.frames().map(|f| f.number).collect();
@@ -221,7 +212,7 @@ mod tests {
     fn frame_without_silence_is_cut_at_the_longest_length() {
         let mut record = Record::default();
         for n in 0..10_000 {
-            record.word(&word(n * 100, 7), Direction::FromMaster, false, SILENCE);
+            record.word(&word(n * 100, 7), Direction::Request, false, SILENCE);
         }
         let lengths: Vec<_> = record.frames().map(|f| f.bytes.len()).collect();
         assert_eq!(lengths, [LONGEST, LONGEST]);
@@ -246,8 +237,8 @@ mod tests {
         let mut bad = good.clone();
         bad[4] ^= 1;
         let frames = record(&[
-            (Direction::FromMaster, 0, good),
-            (Direction::FromMaster, 10_000, bad),
+            (Direction::Request, 0, good),
+            (Direction::Request, 10_000, bad),
         ]);
         let checks: Vec<_> = frames.iter().map(|frame| frame.crc_ok).collect();
         assert_eq!(checks, [true, false]);
@@ -255,21 +246,21 @@ mod tests {
 
     #[test]
     fn gaps_and_turnarounds_are_measured() {
-        use Direction::{FromMaster, FromUnit};
+        use Direction::{Request, Response};
         let frame = |unit| Framing::Rtu.frame(0, unit, &[7]);
         let noise = || vec![0xFF];
         let frames = record(&[
-            (FromMaster, 1000, frame(1)),
+            (Request, 1000, frame(1)),
             // A glitch between a request and its reply does not change the turnaround.
-            (FromMaster, 2000, noise()),
-            (FromUnit, 5000, frame(1)),
-            (FromUnit, 6000, frame(1)),
-            (FromMaster, 10_000, frame(0)),
-            (FromUnit, 11_000, frame(2)),
-            (FromMaster, 20_000, frame(1)),
-            (FromUnit, 21_000, frame(2)),
-            (FromMaster, 30_000, frame(1)),
-            (FromUnit, 32_000, noise()),
+            (Request, 2000, noise()),
+            (Response, 5000, frame(1)),
+            (Response, 6000, frame(1)),
+            (Request, 10_000, frame(0)),
+            (Response, 11_000, frame(2)),
+            (Request, 20_000, frame(1)),
+            (Response, 21_000, frame(2)),
+            (Request, 30_000, frame(1)),
+            (Response, 32_000, noise()),
         ]);
         let us = |time: Option<Time>| time.map(Time::as_us);
         let gaps: Vec<_> = frames.iter().map(|frame| us(frame.gap)).collect();

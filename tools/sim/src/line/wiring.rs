@@ -179,7 +179,7 @@ impl Line {
         let bus = level == self.noise.level_at(at);
         let rx = bus || (self.driver && !self.echo);
         // On the bus, the wave of the unit is that of all units, so that the record attributes their characters to
-        // `FromUnit`. At an end of the line it is the wave of that unit only.
+        // `Response`. At an end of the line it is the wave of that unit only.
         let unit = if self.shared.is_end() {
             unit
         } else {
@@ -263,9 +263,9 @@ impl Line {
         let collided = unit && master || self.shared.senders(word.start, word.at) > 1;
         let unit_began = unit && (!master || self.master.wave.level_at(word.start));
         let direction = if unit_began {
-            Direction::FromUnit
+            Direction::Response
         } else {
-            Direction::FromMaster
+            Direction::Request
         };
         self.record.word(word, direction, collided, silence);
         if unit {

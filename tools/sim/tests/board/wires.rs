@@ -52,11 +52,11 @@ fn byte_is_received_and_sent_back() {
     assert_eq!(frames.len(), 2, "{frames:?}");
     assert_eq!(
         (frames[0].direction, &frames[0].bytes[..]),
-        (Direction::FromMaster, &b"A"[..])
+        (Direction::Request, &b"A"[..])
     );
     assert_eq!(
         (frames[1].direction, &frames[1].bytes[..]),
-        (Direction::FromUnit, &b"B"[..])
+        (Direction::Response, &b"B"[..])
     );
     assert!(!frames[1].damaged);
     // RXNE is set at ten sixteenths of the stop bit, and the reply begins at the next tick of the baud generator: at

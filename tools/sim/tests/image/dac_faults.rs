@@ -121,7 +121,7 @@ fn assert_in_time(bench: &mut Bench) {
     let (due, bit) = (bench.sent + bench.t35(), bench.bit());
     let line = bench.board.line();
     let reply = line.frames().next_back().expect("a reply");
-    assert_eq!(reply.direction, Direction::FromUnit);
+    assert_eq!(reply.direction, Direction::Response);
     let late = reply.start - due;
     assert!(late <= Time::from_us(60) + bit, "{late:?} after t3.5");
 }

@@ -90,7 +90,7 @@ impl Loaded {
         };
         self.bench.exchange(&frame);
         let reply = self.bench.board.line().frames().next_back()?;
-        if reply.direction != Direction::FromUnit || !reply.crc_ok {
+        if reply.direction != Direction::Response || !reply.crc_ok {
             return None;
         }
         // The first digit of the function code is 8 or 9 in an exception.

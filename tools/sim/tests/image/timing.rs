@@ -26,7 +26,7 @@ fn reply_starts_at_t35_and_the_driver_is_on_only_for_the_reply() {
 
         let line = bench.board.line();
         let frame = line.frames().next_back().expect("a reply").clone();
-        assert_eq!(frame.direction, Direction::FromUnit);
+        assert_eq!(frame.direction, Direction::Response);
         assert!(frame.crc_ok && !frame.damaged);
         let turnaround = frame.start - end;
         assert!(turnaround >= Settings::T35, "{turnaround:?} is before t3.5");
@@ -93,7 +93,7 @@ fn driver_is_off_soon_after_the_reply_at_every_rate_and_format() {
                 let frame = line.frames().next_back().expect("a reply").clone();
                 assert_eq!(
                     frame.direction,
-                    Direction::FromUnit,
+                    Direction::Response,
                     "{baud:?}, format {format}"
                 );
                 let edges: Vec<_> = line.driver_edges().collect();

@@ -80,7 +80,7 @@ impl Exchange {
 
     /// Returns the PDU of this frame if the frame is the reply.
     fn reply(&self, frame: &Frame) -> Option<Vec<u8>> {
-        let good = frame.direction == Direction::FromUnit && !frame.damaged;
+        let good = frame.direction == Direction::Response && !frame.damaged;
         if !good || frame.start < self.end {
             return None;
         }
@@ -119,7 +119,7 @@ mod tests {
         let pdu = vec![3, 2, 0, 5];
         let good = Frame {
             number: 2,
-            direction: Direction::FromUnit,
+            direction: Direction::Response,
             start: end + Time::from_ms(4),
             end: end + Time::from_ms(12),
             bytes: Framing::Rtu.frame(0, 7, &pdu),
@@ -140,7 +140,7 @@ mod tests {
         assert_eq!(with(&refusal), Some(vec![0x83, 2]));
         assert_eq!(with(&|frame| frame.bytes[4] ^= 1), None, "wrong CRC");
         assert_eq!(with(&|frame| frame.damaged = true), None);
-        assert_eq!(with(&|frame| frame.direction = Direction::FromMaster), None);
+        assert_eq!(with(&|frame| frame.direction = Direction::Request), None);
         assert_eq!(with(&|frame| frame.start = Time::from_ms(9)), None);
         for (unit, function) in [(8, 3), (7, 4)] {
             let frame = Framing::Rtu.frame(0, unit, &[function, 2, 0, 5]);

@@ -117,13 +117,13 @@ fn request_and_answer_are_received_and_recorded() {
     assert_eq!(frames.len(), 2);
     assert_eq!(
         (frames[0].start, frames[0].direction),
-        (sent, Direction::FromMaster)
+        (sent, Direction::Request)
     );
     assert!(frames[0].end.as_ps().abs_diff(end.as_ps()) < 100);
     assert!(frames[0].crc_ok && !frames[0].damaged);
     assert_eq!(
         (frames[1].start, frames[1].direction),
-        (began, Direction::FromUnit)
+        (began, Direction::Response)
     );
     assert_eq!(frames[1].bytes, request[..4]);
     assert!(!frames[1].damaged);
