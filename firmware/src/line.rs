@@ -2,7 +2,7 @@
 //!
 //! This module does not access hardware: UART and timer are traits of [`board_support::line`]. On the device all of it
 //! runs from RAM, so that it continues while flash is erased or programmed. Functions that are called from here must be
-//! in RAM, too (`memory/sections.x`).
+//! in RAM, too (`board-support/memory/sections.x`).
 
 use board_support::line::{GapTimer, Silence, Uart};
 use modbus_server::{

@@ -37,3 +37,6 @@ pub use table::Table;
 pub use tables::Tables;
 pub use text::TextOut;
 pub use words::{Words, WordsOut};
+
+/// The unit address of a broadcast (V1.02 2.2).
+pub(crate) const BROADCAST: u8 = 0;

@@ -15,7 +15,7 @@ use core::{arch::naked_asm, panic::PanicInfo, ptr};
 
 use board_support::{
     fault::{self, Fault, Kind},
-    outputs_off, restart, stack,
+    kept, outputs_off, restart, stack,
 };
 use cortex_m::{interrupt, peripheral::SCB};
 
@@ -109,7 +109,7 @@ extern "C" fn on_trap(stack_pointer: u32) -> ! {
 
 fn end(fault: &Fault) -> ! {
     outputs_off();
-    fault::note(fault);
+    kept::note(fault);
     restart()
 }
 

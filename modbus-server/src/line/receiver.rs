@@ -7,8 +7,7 @@ use super::state::{
 };
 use super::{Faults, Framing, Units};
 use crate::counters::count;
-use crate::server::BROADCAST;
-use crate::{Adu, LineCounters, crc, length};
+use crate::{Adu, BROADCAST, LineCounters, crc, length};
 
 /// The receiving half of a line (V1.02 2.5.1.1, figure 14, for RTU; 2.5.2.1, figure 17, for ASCII).
 ///

@@ -6,12 +6,9 @@ mod tally;
 use crate::diagnostic::Diagnostic;
 use crate::events::EventLog;
 use crate::line::Framing;
-use crate::{Adu, Counters, DataModel, Function, LineCounters, Outcome, Reply, Request};
+use crate::{Adu, BROADCAST, Counters, DataModel, Function, LineCounters, Outcome, Reply, Request};
 use execute::{Effect, Refusal, execute};
 use tally::{Sent, Tally};
-
-/// The unit address of a broadcast (V1.02 2.2).
-pub(crate) const BROADCAST: u8 = 0;
 
 /// The server of one line. It serves the requests that its [`Port`](crate::line::Port) has received, for one data
 /// model, with three calls: [`Port::take`](crate::line::Port::take), [`serve`](Self::serve),

@@ -2,7 +2,7 @@
 //! response in memory. The CRCs are checked and computed, and nothing is sent.
 
 use register_map::codes::Mode;
-use sim::machine::memory::RAM_BASE;
+use sim::memory::RAM_BASE;
 use sim::{Board, Config, Image, Time};
 
 use crate::framing::{adu, is_adu};

@@ -6,18 +6,7 @@ use std::time::Duration;
 use crate::check::{Check, Failure, Stop};
 use crate::endpoint::{Broken, Endpoint, Piece, Received, shown};
 use crate::frame::{Reply, hex};
-use crate::target::Target;
-
-/// Waiting times.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Patience {
-    /// Time to wait for the first character of a reply that is due.
-    pub reply: Duration,
-    /// Time without a character after which the unit counts as silent, where no reply is due.
-    pub silence: Duration,
-    /// Silence that ends a reply.
-    pub quiet: Duration,
-}
+use crate::target::{Patience, Target};
 
 /// The tools of a case.
 ///

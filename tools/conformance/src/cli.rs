@@ -7,7 +7,6 @@ use anyhow::{Context as _, Result, bail, ensure};
 use clap::Parser;
 use modbus_line::{Format, LineFormat};
 
-use crate::bench::Patience;
 use crate::case::{Case, Kind};
 use crate::endpoint::Endpoint;
 use crate::endpoint::exact_line;
@@ -15,6 +14,7 @@ use crate::endpoint::stream::Stream;
 use crate::frame::Mode;
 use crate::profile::Profile;
 use crate::program::Files;
+use crate::target::Patience;
 
 /// Tests a Modbus serial-line server from outside, case by case, each with the section it comes from.
 ///

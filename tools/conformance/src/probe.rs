@@ -7,12 +7,13 @@ use anyhow::{Context as _, Result, bail, ensure};
 use register_map::points::{self, Kind, output_values};
 use register_map::{BLOCKS, Board, Module, Values, codes, configuration, state};
 
-use crate::bench::{Bench, Patience};
+use crate::bench::Bench;
 use crate::case::Check;
 use crate::endpoint::Endpoint;
 use crate::frame::{Mode, Reply};
 use crate::points::pdu;
 use crate::profile::Profile;
+use crate::target::Patience;
 use crate::target::{Modio, Span, Support, Target, Words};
 
 /// What the user has given, before the unit is asked.

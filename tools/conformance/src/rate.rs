@@ -3,13 +3,14 @@
 use std::time::Duration;
 
 use modbus_line::LineFormat;
-use register_map::codes::{Baud, Command, Format};
+use register_map::codes::Command;
 use register_map::configuration::{BAUD, COMMAND, SAVE_EVERY_S};
 
 use crate::bench::Bench;
 use crate::case::{Check, Stop, skip};
 use crate::frame::{Reply, hex};
 use crate::points::{pdu, write_words};
+use crate::target::codes;
 
 /// Time for the unit to store its configuration.
 const STORING: Duration = Duration::from_millis(200);
@@ -142,14 +143,4 @@ fn move_to(bench: &mut Bench<'_>, to: LineFormat) -> Check {
             return answered;
         }
     }
-}
-
-/// Returns the values of the registers BAUD and FORMAT for a line. The error says what the device does not have.
-pub(crate) fn codes(line: LineFormat) -> Result<[u16; 2], String> {
-    let (baud, name) = (line.baud, line.format.to_string());
-    let rate = Baud::ALL.iter().find(|rate| rate.bits_per_second() == baud);
-    let rate = rate.ok_or_else(|| format!("the device has no rate of {baud} bit/s"))?;
-    let format = Format::ALL.iter().find(|format| format.name() == name);
-    let format = format.ok_or_else(|| format!("the device has no format {name}"))?;
-    Ok([rate.code(), format.code()])
 }

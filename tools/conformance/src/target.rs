@@ -2,12 +2,25 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::time::Duration;
 
+use modbus_line::LineFormat;
+use register_map::codes::{Baud, Format};
 use register_map::points::{self, Kind};
 use register_map::{Board, Module};
 
-use crate::bench::Patience;
 use crate::frame::Mode;
+
+/// Waiting times.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Patience {
+    /// Time to wait for the first character of a reply that is due.
+    pub reply: Duration,
+    /// Time without a character after which the unit counts as silent, where no reply is due.
+    pub silence: Duration,
+    /// Silence that ends a reply.
+    pub quiet: Duration,
+}
 
 /// A run of addresses that one request can ask for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -219,6 +232,16 @@ impl Target {
             _ => self.nowhere(3),
         }
     }
+}
+
+/// Returns the values of the registers BAUD and FORMAT for a line. The error says what the device does not have.
+pub(crate) fn codes(line: LineFormat) -> Result<[u16; 2], String> {
+    let (baud, name) = (line.baud, line.format.to_string());
+    let rate = Baud::ALL.iter().find(|rate| rate.bits_per_second() == baud);
+    let rate = rate.ok_or_else(|| format!("the device has no rate of {baud} bit/s"))?;
+    let format = Format::ALL.iter().find(|format| format.name() == name);
+    let format = format.ok_or_else(|| format!("the device has no format {name}"))?;
+    Ok([rate.code(), format.code()])
 }
 
 #[cfg(test)]

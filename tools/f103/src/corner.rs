@@ -6,7 +6,7 @@
 use core::fmt;
 use core::str::FromStr;
 
-use crate::machine::costs::Costs;
+use crate::costs::Costs;
 use crate::periph::clocks::Oscillators;
 use crate::time::Time;
 

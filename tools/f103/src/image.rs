@@ -6,7 +6,7 @@ use std::path::Path;
 use object::{Object, ObjectSegment, ObjectSymbol};
 
 use crate::error::Error;
-use crate::machine::memory::FLASH_BASE;
+use crate::memory::FLASH_BASE;
 
 /// Bytes of flash of the largest part of the family (RM0008 3.3.3).
 const LARGEST_FLASH: usize = 1024 * 1024;

@@ -10,14 +10,17 @@
 //! machine    core, memories, power, run loop     periph one register block of the part in each file
 //! soc        register blocks, clocks, pins       part   flash, SRAM, pins and identity of each part
 //! corner     how a part may differ from another  image  a firmware image from its ELF file
+//! costs      cycles of instructions              memory addresses, and memory that core and blocks share
 //! ```
 
 pub mod chip;
 pub mod corner;
+pub mod costs;
 mod error;
 pub mod finding;
 pub mod image;
 pub mod machine;
+pub mod memory;
 pub mod part;
 pub mod periph;
 pub mod peripheral;

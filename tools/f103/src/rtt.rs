@@ -8,7 +8,7 @@
 //! The read offset is moved at fixed instants of the virtual time, [`POLL`] apart, whatever the pieces in which a
 //! caller lets the time pass. So the state of the buffer at an instant is the same in every run.
 
-use crate::machine::memory::RAM_BASE;
+use crate::memory::RAM_BASE;
 use crate::time::Time;
 
 /// From one emptying of the buffer to the next.

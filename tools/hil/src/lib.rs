@@ -21,7 +21,7 @@ use anyhow::{Context as _, Error, Result, bail};
 use modbus_line::LineFormat;
 use register_map::{Module, state};
 
-use conformance::bench::{Bench, Patience};
+use conformance::bench::Bench;
 use conformance::case::{Case, Check, Stop, skip};
 use conformance::endpoint::Endpoint;
 use conformance::frame::Mode;
@@ -29,6 +29,7 @@ use conformance::probe::{Given, probe};
 use conformance::rate::tour;
 use conformance::report::table;
 use conformance::run::{Verdict, run_while};
+use conformance::target::Patience;
 
 pub mod about;
 pub mod analog;

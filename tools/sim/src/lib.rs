@@ -25,7 +25,7 @@ pub use bus::Bus;
 pub use error::Error;
 pub use f103::{
     Chip, CoreTime, Corner, Finding, Image, Time, Wait, chip, corner, finding, image, machine,
-    part, periph, rtt, serial, soc, time,
+    memory, part, periph, rtt, serial, soc, time,
 };
 pub use register_map::Module;
 pub use slot::Channel;

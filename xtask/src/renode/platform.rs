@@ -101,6 +101,18 @@ fn pins_are_those_of_the_board() {
 }
 
 #[test]
+fn commands_know_where_the_configuration_is() {
+    for board in Board::ALL {
+        let store = board.store;
+        let (first, bytes) = (store.first, 2 * store.bytes);
+        assert_has(
+            "commands.py",
+            &format!("        \"store\": ({first:#010X}, {bytes}),").replace("0X", "0x"),
+        );
+    }
+}
+
+#[test]
 fn scripts_name_files_that_exist_and_the_image_that_is_built() {
     for board in Board::ALL {
         let elf = build::target(Path::new("../target"), board);

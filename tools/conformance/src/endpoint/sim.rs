@@ -12,7 +12,7 @@ use sim::{Board, Config, Image, Time};
 use super::Broken;
 use super::exact_line::{ExactLine, Transport};
 use crate::frame::Mode;
-use crate::rate::codes;
+use crate::target::codes;
 
 /// Time that the unit has to start after power-on.
 const START: Time = Time::from_ms(150);

@@ -2,7 +2,7 @@
 
 use super::{Chip, Error};
 use crate::finding::Finding;
-use crate::machine::memory::{FLASH_BASE, RAM_BASE};
+use crate::memory::{FLASH_BASE, RAM_BASE};
 use crate::periph::flash::{Durations, Torn};
 use crate::soc::Circuit;
 use crate::soc::map::Block;

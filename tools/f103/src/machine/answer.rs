@@ -3,9 +3,9 @@
 
 use super::bus::Bus;
 use super::dwt;
-use super::memory::{FLASH_BASE, RAM_BASE};
 use super::request::{PPB, Request};
 use crate::finding::{What, Width};
+use crate::memory::{FLASH_BASE, RAM_BASE};
 use crate::periph::ident;
 use crate::peripheral::{Peripheral, Unmodelled};
 use crate::soc::Circuit;

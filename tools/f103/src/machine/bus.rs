@@ -13,12 +13,12 @@ use rigless::soc::Width as CoreWidth;
 use rigless::time::VirtualNanos;
 
 use super::dwt::Dwt;
-use super::memory::{FLASH_BASE, Memory};
 use super::request::{PPB, Request};
 use super::segment::Segments;
 use super::timing::InstructionClock;
 use super::waits::Waits;
 use crate::finding::{Findings, What, Width};
+use crate::memory::{FLASH_BASE, Memory};
 use crate::part::Part;
 use crate::periph::dbgmcu::Dbgmcu;
 use crate::periph::ident::Ident;

@@ -4,9 +4,9 @@
 use rigless::soc::Width;
 use rigless::time::VirtualNanos;
 
-use super::memory::RAM_BASE;
 use super::{Chip, Limit};
 use crate::error::Error;
+use crate::memory::RAM_BASE;
 use crate::soc::Circuit;
 use crate::time::Time;
 

@@ -2,13 +2,13 @@
 //!
 //! A read by code in SRAM stalls the core until the operation ends (PM0075 2.3.1): of a literal, a table or the vector
 //! of an interrupt. The core reads flash without the bus, so all reads of flash are sent to the bus while an operation
-//! runs, and always where every read of constants is charged ([`super::costs`]). Reads of pages with unsteady cells are
+//! runs, and always where every read of constants is charged ([`crate::costs`]). Reads of pages with unsteady cells are
 //! always sent there; instructions are fetched from the more probable bits.
 
 use rigless::emulator::Queued;
 
 use super::bus::Bus;
-use super::memory::{FLASH_BASE, ROUTED_PAGE};
+use crate::memory::{FLASH_BASE, ROUTED_PAGE};
 use crate::soc::Circuit;
 
 impl<C: Circuit> Bus<C> {

@@ -11,9 +11,9 @@ use std::sync::{Mutex, PoisonError};
 
 use rigless::emulator::{Processor, Queued};
 
-use super::memory::{FLASH_BASE, Memory, RAM_BASE, ROUTED_PAGE};
 use super::ram_code::RamCode;
 use super::{Chip, cortex};
+use crate::memory::{FLASH_BASE, Memory, RAM_BASE, ROUTED_PAGE};
 use crate::part::Part;
 use crate::periph::flash::Flash;
 

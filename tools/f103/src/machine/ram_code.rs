@@ -6,7 +6,7 @@
 
 use rigless::emulator::{Processor, Queued};
 
-use super::memory::{Memory, RAM_BASE, ROUTED_PAGE as PAGE};
+use crate::memory::{Memory, RAM_BASE, ROUTED_PAGE as PAGE};
 
 /// The pages of SRAM that code has run from.
 #[derive(Debug, Default)]

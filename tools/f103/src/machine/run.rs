@@ -10,8 +10,8 @@ use rigless::time::VirtualNanos;
 
 use super::Chip;
 use crate::finding::What;
-use crate::machine::memory::RAM_BASE;
 use crate::machine::usage::Rest;
+use crate::memory::RAM_BASE;
 use crate::periph::rcc::Cause;
 use crate::peripheral::Unmodelled;
 use crate::rtt::POLL;

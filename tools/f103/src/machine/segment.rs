@@ -9,9 +9,9 @@ use std::num::NonZero;
 use std::sync::Arc;
 
 use self::made::Made;
-use super::costs::Pace;
 pub use super::decode::End;
 use super::decode::{Class, decode};
+use crate::costs::Pace;
 
 /// Largest number of instructions in a segment.
 const MOST: usize = 24;

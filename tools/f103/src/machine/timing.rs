@@ -1,21 +1,10 @@
 //! The core's clock: converts a number of instructions into cycles of HCLK and into virtual time.
 //!
-//! The costs of an instruction are in [`costs`](super::costs). [`segment`](super::segment) adds the costs of several
+//! The costs of an instruction are in [`costs`](crate::costs). [`segment`](super::segment) adds the costs of several
 //! instructions.
 
 use super::segment::Segment;
 use crate::time::Time;
-
-/// Returns the highest SYSCLK in Hz that is allowed with this number of wait states (RM0008 3.3.3), with the tolerance
-/// of the crystal.
-#[must_use]
-pub const fn highest_sysclk(wait_states: u32) -> u32 {
-    match wait_states {
-        0 => 24_000_000,
-        1 => 48_000_000,
-        _ => crate::periph::clocks::MAX_SYSCLK,
-    }
-}
 
 /// Converts a number of instructions into virtual time and into cycles of HCLK.
 ///

@@ -1,7 +1,7 @@
 //! Measures how long interrupts wait: from the instant at which one is pending and enabled to the entry of its handler.
 //!
 //! A wait includes all that delays the handler: PRIMASK, BASEPRI, a handler of the same or a higher priority, a flash
-//! operation. It does not include the cycles of the entry itself ([`super::costs`]).
+//! operation. It does not include the cycles of the entry itself ([`crate::costs`]).
 //!
 //! During the measurement the core returns to the run loop after every access outside the memories, so that no change
 //! of the NVIC's registers is missed. An entry is detected by its read of the vector table: reads of the page with this
@@ -12,7 +12,7 @@ use rigless::emulator::{Processor, Queued};
 use rigless::soc::Width;
 use rigless::time::VirtualNanos;
 
-use crate::machine::memory::RAM_BASE;
+use crate::memory::RAM_BASE;
 use crate::soc::map::irq;
 use crate::time::Time;
 

@@ -10,6 +10,17 @@ pub const HSE_HZ: u32 = 8_000_000;
 /// Maximum SYSCLK in Hz (RM0008 7.2), plus the 100 ppm by which a crystal may be fast.
 pub const MAX_SYSCLK: u32 = 72_000_000 + 72_000_000 / 10_000;
 
+/// Returns the highest SYSCLK in Hz that is allowed with this number of wait states (RM0008 3.3.3), with the tolerance
+/// of the crystal.
+#[must_use]
+pub const fn highest_sysclk(wait_states: u32) -> u32 {
+    match wait_states {
+        0 => 24_000_000,
+        1 => 48_000_000,
+        _ => MAX_SYSCLK,
+    }
+}
+
 /// The part's oscillators.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Oscillators {

@@ -267,7 +267,7 @@ impl<C: Circuit> Soc<C> {
     /// Reports a flash with fewer wait states than SYSCLK needs (RM0008 3.3.3).
     fn check_wait_states(&mut self, now: Time) {
         let (wait_states, _) = self.flash.access_control();
-        if self.clocks.sysclk > crate::machine::timing::highest_sysclk(wait_states) {
+        if self.clocks.sysclk > crate::periph::clocks::highest_sysclk(wait_states) {
             let text = "SYSCLK is too fast for the wait states of the flash";
             self.notes.push((now, What::Other(text)));
         }

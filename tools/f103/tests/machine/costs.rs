@@ -1,4 +1,4 @@
-//! Costs of code at the two corners of the core, against the classes of `f103::machine::costs`, calculated by hand.
+//! Costs of code at the two corners of the core, against the classes of `f103::costs`, calculated by hand.
 
 use f103::chip::Config;
 use f103::{Chip, Corner, Time};

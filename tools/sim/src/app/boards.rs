@@ -107,7 +107,7 @@ fn write_preset(config: &Config, flash: &mut [u8]) {
 #[cfg(test)]
 mod tests {
     use register_map::{Module, record};
-    use sim::machine::memory::FLASH_BASE;
+    use sim::memory::FLASH_BASE;
 
     use super::*;
 

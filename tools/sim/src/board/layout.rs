@@ -117,7 +117,7 @@ const fn pins<const N: usize>(names: [(char, usize); N]) -> [Pin; N] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use f103::machine::memory::FLASH_BASE;
+    use f103::memory::FLASH_BASE;
 
     #[test]
     fn every_board_of_the_register_map_has_a_layout_that_matches() {

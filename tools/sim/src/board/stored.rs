@@ -5,7 +5,7 @@ use std::ops::Range;
 use register_map::{Module, configuration, record};
 
 use super::Layout;
-use f103::machine::memory::FLASH_BASE;
+use f103::memory::FLASH_BASE;
 
 impl Layout {
     /// Returns the two pages of the configuration, as ranges of the flash.

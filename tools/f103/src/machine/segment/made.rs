@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
 use super::{MOST, Place, Segment};
-use crate::machine::costs::Pace;
+use crate::costs::Pace;
 
 /// Number of segments above which those that no machine uses any more are dropped.
 const MANY: usize = 1 << 14;

@@ -8,7 +8,7 @@
 use core::ops::Range;
 use std::collections::BTreeMap;
 
-use crate::machine::memory::Memory;
+use crate::memory::Memory;
 use crate::part::Part;
 
 /// The result of an interrupted operation. The part guarantees nothing; each choice is the same in every run.

@@ -8,7 +8,7 @@ mod operations;
 
 use std::num::NonZero;
 
-use crate::machine::memory::Memory;
+use crate::memory::Memory;
 use crate::part::Part;
 use crate::peripheral::{Peripheral, Unmodelled};
 use crate::time::Time;
@@ -148,7 +148,7 @@ impl Flash {
         }
     }
 
-    /// Returns the host address of the cells, for the core ([`crate::machine::memory::Memory::host`]).
+    /// Returns the host address of the cells, for the core ([`crate::memory::Memory::host`]).
     pub fn host(&mut self) -> *mut u8 {
         self.cells.host()
     }

@@ -5,7 +5,7 @@ use super::{
     Busy, CR_MER, CR_PER, CR_PG, Complaint, FETCHED_AHEAD, Flash, Lock, SR_BSY, SR_PGERR,
     SR_WRPRTERR,
 };
-use crate::machine::memory::FLASH_BASE;
+use crate::memory::FLASH_BASE;
 use crate::time::Time;
 
 /// Bytes that a bit of FLASH_WRPR protects: four pages of 1 KiB or two of 2 KiB (PM0075 3.9).

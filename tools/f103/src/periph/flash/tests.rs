@@ -1,7 +1,7 @@
 //! The controller against PM0075.
 
 use super::*;
-use crate::machine::memory::FLASH_BASE;
+use crate::memory::FLASH_BASE;
 use crate::part::{STM32F103CB, STM32F103RC};
 
 const NOW: Time = Time::ZERO;
