@@ -1,5 +1,6 @@
-//! Tests of `modioctl` with the release image in the simulator: over a pseudo-terminal, over TCP and over Modbus
-//! TCP. They need the simulator and the image, whose paths `cargo xtask test` passes in MODIO_SIM and MODIO_ELF.
+//! Tests of `modioctl` as a program: with units that the tests serve themselves, and with the release image in the
+//! simulator, over a pseudo-terminal, over TCP and over Modbus TCP. The latter are ignored unless `cargo xtask test` runs
+//! them, which passes the paths of simulator and image in MODIO_SIM and MODIO_ELF.
 
 #![cfg(unix)]
 
