@@ -33,7 +33,7 @@ fn main() {
     fs::write(out.join("images.rs"), format!("&[\n{rows}]\n")).expect("OUT_DIR must be writable");
 }
 
-/// The images in a directory, sorted by name.
+/// Returns the images in a directory, sorted by name.
 fn images(directory: &Path) -> Vec<(String, PathBuf)> {
     let files = fs::read_dir(directory)
         .unwrap_or_else(|error| panic!("{VARIABLE}: {}: {error}", directory.display()));

@@ -64,8 +64,8 @@ fn patched(workspace: &Workspace) -> Result<Workspace> {
     Ok(copy)
 }
 
-/// Returns the files of the project that git knows or would add. Cargo finds the configuration in the directory above the
-/// copy; a second one would double its flags.
+/// Returns the files of the project that git knows or would add. Cargo finds the configuration in the directory above
+/// the copy; a second one would double its flags.
 fn files(root: &Path) -> Result<Vec<PathBuf>> {
     let mut git = std::process::Command::new("git");
     git.current_dir(root);

@@ -1,5 +1,5 @@
-//! `cargo xtask docs`: `docs/register-map.md`, written from the registers' own data so that it cannot say anything else,
-//! and the list of modules in `renode/commands.py`.
+//! `cargo xtask docs`: `docs/register-map.md`, written from the registers' own data so that it cannot say anything
+//! else, and the list of modules in `renode/commands.py`.
 
 use std::fmt::{Result, Write};
 use std::ops::Range;

@@ -1,7 +1,7 @@
 //! `cargo xtask fuzz`: the targets of `fuzz/` with cargo-fuzz.
 //!
-//! Of cargo-fuzz only the address sanitizer needs a nightly compiler, and it finds nothing in code without `unsafe`. New
-//! inputs are written to `target/fuzz`, and the committed corpus does not change.
+//! Of cargo-fuzz only the address sanitizer needs a nightly compiler, and it finds nothing in code without `unsafe`.
+//! New inputs are written to `target/fuzz`, and the committed corpus does not change.
 
 use std::path::{Path, PathBuf};
 

@@ -55,8 +55,8 @@ const MODULES: u64 = Module::ALL.len() as u64;
 #[derive(clap::Args, Clone, Debug)]
 #[group(skip)]
 pub struct Matrix {
-    /// Move the modules on by so many rates, to repeat a run [default: the number of the day, so that each rate has every
-    /// module once in as many days as there are modules]
+    /// Move the modules on by so many rates, to repeat a run [default: the number of the day, so that each rate has
+    /// every module once in as many days as there are modules]
     #[arg(long, value_parser = clap::value_parser!(u64).range(..MODULES))]
     turn: Option<u64>,
 }

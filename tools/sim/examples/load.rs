@@ -194,7 +194,7 @@ fn poll(bus: &mut Bus, unit: u8) -> bool {
     Framing::Rtu.open(&reply).is_some()
 }
 
-/// Time that all threads of this process have spent on a core; `None` if the system does not show it.
+/// Returns the time that all threads of this process have spent on a core; `None` if the system does not show it.
 fn cpu_time() -> Option<Duration> {
     let mut total = Duration::ZERO;
     for thread in fs::read_dir("/proc/self/task").ok()? {

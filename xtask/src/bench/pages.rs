@@ -26,7 +26,8 @@ impl Baseline {
             .unwrap_or_else(|| panic!("no {name:?}")) as u64
     }
 
-    /// The largest instructions of the interrupt for a byte in or out, of the rows whose name begins so or not.
+    /// Returns the largest number of instructions of the interrupt for a byte in or out, of the rows whose name begins
+    /// so or not.
     fn byte(&self, ascii: bool) -> u64 {
         let rows = self.0.as_object().unwrap().iter();
         let bytes = rows.filter(|(name, _)| {

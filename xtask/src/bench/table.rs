@@ -5,9 +5,9 @@ use serde_json::Value;
 use super::figures::{COLUMNS, load_name, over_budget, rows, waits};
 use crate::table;
 
-/// Instructions of FreeMODBUS without RTIC and a UART driver, measured on a Cortex-M3 when modio was designed: from t3.5
-/// to the first byte, and for the whole transaction, with 41 for a byte in and 37 for each byte out after the first. The
-/// figure of function 10 is that of 120 registers.
+/// Instructions of FreeMODBUS without RTIC and a UART driver, measured on a Cortex-M3 when modio was designed: from
+/// t3.5 to the first byte, and for the whole transaction, with 41 for a byte in and 37 for each byte out after the
+/// first. The figure of function 10 is that of 120 registers.
 const FREEMODBUS: [(&str, u64, u64); 5] = [
     ("03 read holding registers, 1", 414, 8 * 41 + 414 + 6 * 37),
     (

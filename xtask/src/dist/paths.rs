@@ -71,7 +71,7 @@ impl Paths {
     }
 }
 
-/// The target directory of the builds of a release.
+/// Returns the target directory of the builds of a release.
 fn directory(workspace: &Workspace) -> PathBuf {
     workspace.target.join("release-files")
 }

@@ -24,8 +24,8 @@ const PROGRAMS: [(&str, &str); 4] = [
     ("hil", "modio-hil"),
 ];
 
-/// Builds the programs for a target, the simulator with the images `BOARD.elf` of a directory in it, and writes them and
-/// their bills of materials.
+/// Builds the programs for a target, the simulator with the images `BOARD.elf` of a directory in it, and writes them
+/// and their bills of materials.
 pub fn files(
     workspace: &Workspace,
     target: &str,

@@ -143,8 +143,8 @@ fn component(package: &Package, sums: &Sums) -> Result<Value> {
 mod tests {
     use super::*;
 
-    /// The metadata of four packages: `firmware` depends on `crc` and on a macro, `crc` on `firmware` for its tests, and
-    /// `other` on nothing.
+    /// The metadata of four packages: `firmware` depends on `crc` and on a macro, `crc` on `firmware` for its tests,
+    /// and `other` on nothing.
     fn metadata() -> Metadata {
         let registry = "registry+https://github.com/rust-lang/crates.io-index";
         let package = |id: &str, name: &str, version: &str, source: Option<&str>| {

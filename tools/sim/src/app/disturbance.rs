@@ -35,17 +35,17 @@ impl Default for Disturbance {
 }
 
 impl Disturbance {
-    /// Probability that a bit time is inverted.
+    /// Returns the probability that a bit time is inverted.
     pub fn bit_error_rate(&self) -> f64 {
         self.bit_error_rate
     }
 
-    /// Mean number of noise pulses per second.
+    /// Returns the mean number of noise pulses per second.
     pub fn noise_hz(&self) -> f64 {
         self.noise_hz
     }
 
-    /// Share of bytes that are lost.
+    /// Returns the share of bytes that are lost.
     pub fn drop_rate(&self) -> f64 {
         self.drop_rate
     }
@@ -113,8 +113,8 @@ impl Strikes {
     }
 }
 
-/// Random time between two events with a mean rate of `hz`, exponentially distributed: at least 1 us. At 0 Hz it is
-/// [`Time::MAX`]: there is no event.
+/// Returns a random time between two events with a mean rate of `hz`, exponentially distributed: at least 1 us. At 0 Hz
+/// it is [`Time::MAX`]: there is no event.
 fn pause(hz: f64, chance: &mut Rng) -> Time {
     if hz == 0.0 {
         return Time::MAX;

@@ -15,8 +15,8 @@ use sim::Board;
 pub struct FlashFile {
     /// Path of the file itself, with symlinks followed, so that a symlink is not replaced.
     path: PathBuf,
-    /// [`sim::Chip::flash_changes`] of the contents; `None` if the file has not been written yet, or if the last attempt
-    /// has failed.
+    /// [`sim::Chip::flash_changes`] of the contents; `None` if the file has not been written yet, or if the last
+    /// attempt has failed.
     holds: Option<u64>,
     /// The last write error that was reported.
     reported: Option<String>,
@@ -80,7 +80,8 @@ impl FlashFile {
         Ok(())
     }
 
-    /// As [`keep`](Self::keep), but reports an error on stderr. The same error is not reported again and again.
+    /// Does the same as [`keep`](Self::keep), but reports an error on stderr. The same error is not reported again and
+    /// again.
     pub fn keep_or_report(&mut self, board: &Board) {
         if let Err(what) = self.keep(board)
             && self.reported.as_ref() != Some(&what)

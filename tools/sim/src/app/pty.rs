@@ -72,8 +72,8 @@ impl Pty {
         Some(&self.path)
     }
 
-    /// From now on [`take_rate`](Self::take_rate) returns the rates that a master sets. The rate until then is `baud`,
-    /// in bit/s.
+    /// Lets [`take_rate`](Self::take_rate) return from now on the rates that a master sets. The rate until then is
+    /// `baud`, in bit/s.
     ///
     /// # Errors
     ///

@@ -1,4 +1,5 @@
-//! Boards and waits for tests of the command. The core of a board runs an endless loop; the rest of the board works as usual.
+//! Boards and waits for tests of the command. The core of a board runs an endless loop; the rest of the board works as
+//! usual.
 
 use std::thread;
 use std::time::{Duration, Instant};

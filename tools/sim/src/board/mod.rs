@@ -59,12 +59,13 @@ impl Board {
         Ok(Self(Chip::in_circuit(image, chip, circuit)?))
     }
 
-    /// As [`Chip::run_until`]. A method of the board itself, so that the argument may borrow what contains the board.
+    /// Does the same as [`Chip::run_until`]. A method of the board itself, so that the argument may borrow what
+    /// contains the board.
     pub fn run_until(&mut self, t: Time) {
         self.0.run_until(t);
     }
 
-    /// As [`Chip::run_for`]. A method of the board itself, as [`run_until`](Self::run_until).
+    /// Does the same as [`Chip::run_for`]. A method of the board itself, as [`run_until`](Self::run_until).
     pub fn run_for(&mut self, d: Time) {
         self.0.run_for(d);
     }

@@ -103,7 +103,7 @@ impl Bus {
         &self.boards
     }
 
-    /// Board `n`, counted from 0.
+    /// Returns board `n`, counted from 0.
     ///
     /// # Panics
     ///
@@ -113,8 +113,8 @@ impl Bus {
         &self.boards[n]
     }
 
-    /// Board `n`, counted from 0, for changing it. A method that lets the time of this board pass leaves the other
-    /// boards behind. They catch up in the next run, and until then this board receives nothing from them.
+    /// Returns board `n`, counted from 0, for changing it. A method that lets the time of this board pass leaves the
+    /// other boards behind. They catch up in the next run, and until then this board receives nothing from them.
     ///
     /// # Panics
     ///

@@ -167,7 +167,7 @@ impl Line {
         self.bus.level_at(at)
     }
 
-    /// Falling edges of the bus after `from`, up to and including `to`. Both must be within [`HISTORY`].
+    /// Returns the falling edges of the bus after `from`, up to and including `to`. Both must be within [`HISTORY`].
     pub fn falling_edges(&self, from: Time, to: Time) -> impl Iterator<Item = Time> + '_ {
         self.bus
             .edges(from, to)

@@ -77,7 +77,7 @@ impl Shared {
         self.role == Role::Bus
     }
 
-    /// The driver of the unit at this end was switched.
+    /// Notes that the driver of the unit at this end was switched.
     pub(super) fn switched(&mut self, at: Time, on: bool) {
         if self.is_end() {
             self.changed = true;

@@ -40,7 +40,7 @@ pub struct Air {
 }
 
 impl Air {
-    /// Air in which nothing is sent, and a gateway with the factory parameters. It follows the board `leader`.
+    /// Returns air in which nothing is sent, and a gateway with the factory parameters. It follows the board `leader`.
     pub(crate) fn new(leader: u16, now: Time, corner: Corner) -> Self {
         let mut gateway = Module::new(Sender::Gateway, Parameters::FACTORY, corner);
         gateway.advance(now);

@@ -21,7 +21,7 @@ struct Signal {
 }
 
 impl Signal {
-    /// When the receiver has checked the packet.
+    /// Returns when the receiver has checked the packet.
     fn checked(&self) -> Time {
         self.packet.end + timing::CHECK
     }
@@ -45,12 +45,12 @@ impl Antenna {
         }
     }
 
-    /// The radio receives from `at` on, which may be in the future.
+    /// Notes that the radio receives from `at` on, which may be in the future.
     pub(super) fn listen(&mut self, at: Time) {
         self.listening_since = Some(at);
     }
 
-    /// The radio is off or sends.
+    /// Notes that the radio is off or sends.
     pub(super) fn stop(&mut self) {
         self.listening_since = None;
     }
@@ -68,7 +68,7 @@ impl Antenna {
         self.signals.push(signal);
     }
 
-    /// A packet has ended at `at` because its transmitter has lost its power.
+    /// Notes that a packet has ended at `at` because its transmitter has lost its power.
     pub(super) fn cut(&mut self, sender: Sender, number: u64, at: Time) {
         for signal in &mut self.signals {
             if signal.packet.is(sender, number) {

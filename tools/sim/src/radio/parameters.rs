@@ -57,7 +57,7 @@ pub(super) const SLEEP_UART: Settings = Settings {
 pub struct Parameters([u8; 5]);
 
 impl Default for Parameters {
-    /// [`Parameters::FACTORY`].
+    /// Returns [`Parameters::FACTORY`].
     fn default() -> Self {
         Self::FACTORY
     }

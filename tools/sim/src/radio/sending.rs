@@ -19,7 +19,8 @@ pub(super) struct Sending {
 }
 
 impl Sending {
-    /// Takes a byte from the UART; it is lost if the buffer is full. The UART is silent at `silent_at` if no other byte follows.
+    /// Takes a byte from the UART; it is lost if the buffer is full. The UART is silent at `silent_at` if no other byte
+    /// follows.
     pub(super) fn put(&mut self, byte: u8, silent_at: Time) {
         self.silent_at = silent_at;
         if self.buffer.len() < timing::BUFFER_BYTES {
@@ -65,7 +66,7 @@ impl Sending {
         due.then(|| self.buffer.drain(..length).collect())
     }
 
-    /// A packet is being sent until `end`.
+    /// Notes that a packet is being sent until `end`.
     pub(super) fn begin(&mut self, end: Time) {
         self.on_air = Some(end);
     }

@@ -81,7 +81,7 @@ impl Uart {
         }
     }
 
-    /// The pin of the transmitter at RXD is driven like this from `now` on.
+    /// Notes that the pin of the transmitter at RXD is driven like this from `now` on.
     pub(crate) fn set_pin(&mut self, pin: TxPin, now: Time) {
         if pin == self.pin {
             return;
@@ -139,7 +139,7 @@ impl Uart {
         }
     }
 
-    /// End of the last byte at TXD.
+    /// Returns the end of the last byte at TXD.
     pub(super) const fn sent_until(&self) -> Time {
         self.sent_until
     }
@@ -150,7 +150,7 @@ impl Uart {
         waiting.take_while(|byte| byte.start >= now).count()
     }
 
-    /// Nothing more is sent from `now` on: TXD goes high.
+    /// Ends all sending from `now` on: TXD goes high.
     pub(super) fn cut(&mut self, now: Time) {
         self.txd.truncate(now);
         self.txd.push(now, true);

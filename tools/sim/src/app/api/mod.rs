@@ -100,7 +100,7 @@ pub fn answer(bench: &mut Bench, request: &Request) -> Reply {
     }
 }
 
-/// The board that the path names, and the path without its name.
+/// Returns the board that the path names, and the path without its name.
 fn of_board<'a>(bench: &Bench, path: &'a str) -> Option<(usize, &'a str)> {
     let (name, rest) = path.strip_prefix("boards/")?.split_once('/')?;
     let mut units = bench.units.iter();
@@ -363,13 +363,13 @@ fn channel_number(text: &str) -> Option<usize> {
         .map(|position| position + 1)
 }
 
-/// The port in a path. Only the usual form of a number names a port, neither `+1` nor `01`.
+/// Returns the port in a path. Only the usual form of a number names a port, neither `+1` nor `01`.
 fn port_number(text: &str) -> Option<u8> {
     let port: u8 = text.parse().ok()?;
     (port.to_string() == text).then_some(port)
 }
 
-/// The K of `since=K`; 0 without a query, because frames are numbered from 1.
+/// Returns the K of `since=K`; 0 without a query, because frames are numbered from 1.
 fn since(query: &str) -> Result<u64, Reply> {
     if query.is_empty() {
         return Ok(0);

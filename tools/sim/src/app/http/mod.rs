@@ -54,7 +54,7 @@ pub fn listen(
     serve(address, events, live, connections::PATIENCE)
 }
 
-/// As [`listen`]. A connection over which nothing can be sent for `patience` is closed.
+/// Does the same as [`listen`]. A connection over which nothing can be sent for `patience` is closed.
 fn serve(
     address: SocketAddr,
     events: Sender<Event>,
@@ -133,7 +133,7 @@ impl Server {
         }
     }
 
-    /// The reply to `GET target`.
+    /// Returns the reply to `GET target`.
     async fn get(&self, target: &str) -> api::Reply {
         self.board(api::Request {
             method: "GET".to_owned(),
@@ -169,7 +169,7 @@ async fn ask(State(server): State<Server>, request: axum::extract::Request) -> a
     }
 }
 
-/// Path and query of a request.
+/// Returns path and query of a request.
 fn target(uri: &Uri) -> String {
     uri.path_and_query()
         .map_or_else(|| uri.path().to_owned(), ToString::to_string)

@@ -60,7 +60,7 @@ impl Ramp {
         (f64::from(from) + (f64::from(self.to) - f64::from(from)) * share).round() as u16
     }
 
-    /// Virtual time at which the ramp ends; `None` before it has begun.
+    /// Returns the virtual time at which the ramp ends; `None` before it has begun.
     pub fn end(&self) -> Option<Time> {
         self.begun.map(|(begin, _)| begin + self.over)
     }

@@ -136,7 +136,7 @@ impl Mcp4728 {
         self.eeprom
     }
 
-    /// Code of an output (`channel` 0 to 3): 0 while the channel is powered down.
+    /// Returns the code of an output (`channel` 0 to 3): 0 while the channel is powered down.
     #[must_use]
     pub const fn output(&self, channel: usize) -> u16 {
         let setting = self.registers[channel];
