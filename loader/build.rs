@@ -2,7 +2,8 @@
 
 use std::{env, fs, path::PathBuf};
 
-/// The public keys, when the variable does not name others: the development keys, whose private halves everybody has.
+/// The public keys, when the variable does not name others: the development keys. The private half of the first is beside
+/// it, so everybody has it.
 const DEVELOPMENT: &str = "keys/development.pub";
 
 fn main() {

@@ -29,6 +29,9 @@ const POWER_ON: u8 = 1 << 4;
 /// Whether the application is linked for a slot behind the loader.
 const HAS_LOADER: bool = cfg!(any(feature = "slot-a", feature = "slot-b"));
 
+/// The position of SW01 for recovery mode.
+const RECOVERY: u8 = 255;
+
 /// The board's devices.
 pub struct Board {
     /// Clock source of the core.
@@ -38,7 +41,7 @@ pub struct Board {
     pub reset_cause: u8,
     /// The last fault before this start.
     pub faults: FaultRecord,
-    /// SW01 as a number from 0 to 255, as read at power-on.
+    /// SW01 as a number from 0 to 255, as read at power-on; 255 if SW01 = 254 chose the slot that runs.
     pub dip: u8,
     /// Number of saves that were left before the reset, 255 after power-on.
     pub saves_left: u8,
@@ -117,7 +120,12 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
     // Configure the driver-enable pin first, so that nothing is sent on the bus.
     rs485::set_up_pins();
 
-    let dip = kept.dip().unwrap_or_else(|| switch(clock.core_mhz()));
+    let dip = match kept.dip() {
+        // The switch has chosen the slot, so it names no unit address.
+        Some(_) if HAS_LOADER && kept.is_chosen() => RECOVERY,
+        Some(dip) => dip,
+        None => switch(clock.core_mhz()),
+    };
 
     // PC13 must not be faster than 2 MHz nor drive more than 3 mA (DS5319 table 5, notes).
     let leds = [

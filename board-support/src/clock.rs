@@ -80,6 +80,16 @@ pub(crate) fn start(rcc: &pac::RCC, flash: &pac::FLASH, crystal: bool) -> ClockS
     ClockSource::Internal
 }
 
+/// Sets the clocks and the wait states of the flash as after a reset: the internal oscillator without PLL.
+#[cfg(feature = "loader")]
+pub(crate) fn as_after_reset(rcc: &pac::RCC, flash: &pac::FLASH) {
+    to_internal_without_pll(rcc);
+    rcc.cr()
+        .modify(|_, w| w.csson().clear_bit().hseon().clear_bit());
+    rcc.cfgr().reset();
+    flash.acr().reset();
+}
+
 /// Switches to the internal oscillator and turns the PLL off, as after a reset. A debugger or a boot loader may
 /// have left the PLL on, and its settings can only be changed while it is off.
 fn to_internal_without_pll(rcc: &pac::RCC) {

@@ -26,6 +26,8 @@ pub struct Loading {
     crc: CrcUnit,
     flash: Flash,
     watchdog: Watchdog,
+    /// The crystal has not failed since power-on.
+    crystal: bool,
 }
 
 /// What was kept over the reset, and SW01.
@@ -48,17 +50,13 @@ impl Loading {
         let mut rcc = device.RCC;
         let watchdog = Watchdog::start_loader(device.IWDG, &device.DBGMCU);
         let kept = kept::at_loading(take_reset_cause(&rcc));
-        let mut switched = kept.switched;
-        if !kept.has_dip {
+        let dip = kept.dip.unwrap_or_else(|| {
             set_up_ports(&mut rcc);
-            switched = switch(LOADER_MHZ) == OTHER_SLOT;
-            if switched {
-                kept::keep_switched();
-            }
-        }
+            switch(LOADER_MHZ)
+        });
         let found = Found {
             asked: kept.asked,
-            switched,
+            switched: dip == OTHER_SLOT && !kept.used,
             chosen: usize::from(kept.chosen).checked_sub(1),
         };
         pac::PWR::enable(&mut rcc);
@@ -66,6 +64,7 @@ impl Loading {
             crc: CrcUnit::new(device.CRC, &mut rcc),
             flash: Flash::new(device.FLASH, device.PWR, 0),
             watchdog,
+            crystal: kept.crystal,
             rcc,
         };
         (loading, found)
@@ -86,13 +85,15 @@ impl Loading {
         self.crc.of(parts)
     }
 
-    /// Runs the core at full speed, for the check of a signature. Only a reset ends this.
+    /// Runs the core at full speed, for the check of a signature, and refreshes the watchdog. Uses the crystal unless it
+    /// has failed since power-on.
     pub fn run_fast(&mut self) {
-        clock::start(&self.rcc, self.flash.controller(), true);
+        self.watchdog.refresh();
+        clock::start(&self.rcc, self.flash.controller(), self.crystal);
     }
 
     /// Starts the application in a slot at this offset, where its vector table is. Keeps the slot as the choice of
-    /// SW01 = 254 if it is `chosen`. Everything is as after a reset but the watchdog, which runs.
+    /// SW01 = 254 if it is `chosen`. Clocks, pins and the voltage detector are as after a reset; the watchdog runs.
     ///
     /// # Safety
     ///
@@ -103,6 +104,7 @@ impl Loading {
         pac::GPIOB::reset(&mut self.rcc);
         pac::GPIOC::reset(&mut self.rcc);
         pac::PWR::reset(&mut self.rcc);
+        clock::as_after_reset(&self.rcc, self.flash.controller());
         self.rcc.ahbenr().reset();
         self.rcc.apb2enr().reset();
         self.rcc.apb1enr().reset();
@@ -118,6 +120,7 @@ impl Loading {
 
     /// Shows that no image can be started: the fault LED is lit, and the running LED blinks five times a second.
     pub fn show_nothing(mut self) -> ! {
+        clock::as_after_reset(&self.rcc, self.flash.controller());
         set_up_ports(&mut self.rcc);
         let _fault = IoPin::high(Pin::b(9));
         let running = Pin::c(13);

@@ -116,7 +116,8 @@ fn checked(part: &mut impl Part, record: &mut Record) -> Result<bool, Unwritten>
                 Ok(()) => State::Trial(0),
                 Err(reason) => State::Rejected(reason),
             };
-            put(part, record, slot, verdict)?;
+            // Without the verdict the next start finds that the check was interrupted.
+            let _ = put(part, record, slot, verdict);
             return Ok(true);
         }
     }
@@ -177,4 +178,172 @@ fn put(
     part.write(changed)?;
     *record = changed;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use std::{vec, vec::Vec};
+
+    use super::*;
+    use State::{Checking, Confirmed, Empty, New, Rejected, Trial};
+
+    /// A part whose slots hold genuine images of epochs 3 and 4, except where a field says otherwise.
+    #[derive(Default)]
+    struct Genuine {
+        damaged: Option<Slot>,
+        forged: Option<Slot>,
+        refuses: bool,
+        written: Vec<[State; 2]>,
+    }
+
+    impl Part for Genuine {
+        fn is_intact(&mut self, slot: Slot) -> bool {
+            self.damaged != Some(slot)
+        }
+
+        fn epoch(&mut self, slot: Slot) -> u16 {
+            3 + slot as u16
+        }
+
+        fn check(&mut self, slot: Slot, _: u16) -> Result<(), Reason> {
+            if self.forged == Some(slot) {
+                Err(Reason::Signature)
+            } else {
+                Ok(())
+            }
+        }
+
+        fn write(&mut self, record: Record) -> Result<(), Unwritten> {
+            if self.refuses {
+                return Err(Unwritten);
+            }
+            self.written.push(record.states);
+            Ok(())
+        }
+    }
+
+    /// Returns what a start does with these states, with A preferred and floor 4, and the states that it writes.
+    fn start(mut part: Genuine, states: [State; 2], start: Start) -> (Next, Vec<[State; 2]>) {
+        let record = Record {
+            preferred: Slot::A,
+            states,
+            floor: 4,
+        };
+        let next = decide(&mut part, Some(record), start);
+        (next, part.written)
+    }
+
+    fn run(slot: Slot) -> Next {
+        Next::Run { slot, chosen: None }
+    }
+
+    fn ordinary(states: [State; 2]) -> (Next, Vec<[State; 2]>) {
+        start(Genuine::default(), states, Start::default())
+    }
+
+    #[test]
+    fn new_image_is_checked_and_the_part_is_reset() {
+        let checking = [Confirmed, Checking];
+        let genuine = (Next::Reset, vec![checking, [Confirmed, Trial(0)]]);
+        assert_eq!(ordinary([Confirmed, New]), genuine);
+        let forged = Genuine {
+            forged: Some(Slot::B),
+            ..Genuine::default()
+        };
+        let rejected = [Confirmed, Rejected(Reason::Signature)];
+        assert_eq!(
+            start(forged, [Confirmed, New], Start::default()),
+            (Next::Reset, vec![checking, rejected])
+        );
+        let interrupted = [Confirmed, Rejected(Reason::Interrupted)];
+        assert_eq!(ordinary(checking), (run(Slot::A), vec![interrupted]));
+    }
+
+    #[test]
+    fn trial_has_two_starts_and_an_order_does_not_count() {
+        let trial = |starts| [Confirmed, Trial(starts)];
+        assert_eq!(ordinary(trial(0)), (run(Slot::B), vec![trial(1)]));
+        assert_eq!(ordinary(trial(1)), (run(Slot::B), vec![trial(2)]));
+        let rejected = [Confirmed, Rejected(Reason::NotConfirmed)];
+        assert_eq!(ordinary(trial(2)), (run(Slot::A), vec![rejected]));
+        let asked = Start {
+            asked: true,
+            ..Start::default()
+        };
+        let part = Genuine::default();
+        assert_eq!(start(part, trial(1), asked), (run(Slot::B), vec![]));
+        let damaged = Genuine {
+            damaged: Some(Slot::B),
+            ..Genuine::default()
+        };
+        let rejected = [Confirmed, Rejected(Reason::Crc)];
+        let next = start(damaged, trial(0), Start::default());
+        assert_eq!(next, (run(Slot::A), vec![rejected]));
+    }
+
+    #[test]
+    fn switch_chooses_the_other_slot_and_the_choice_is_kept() {
+        let chosen = |slot| Next::Run {
+            slot,
+            chosen: Some(slot),
+        };
+        let switched = Start {
+            switched: true,
+            ..Start::default()
+        };
+        let kept = Start {
+            chosen: Some(Slot::B),
+            ..Start::default()
+        };
+        for how in [switched, kept] {
+            let next = start(Genuine::default(), [Confirmed; 2], how);
+            assert_eq!(next, (chosen(Slot::B), vec![]));
+            let next = start(Genuine::default(), [Confirmed, Empty], how);
+            assert_eq!(next, (run(Slot::A), vec![]));
+        }
+        // A has an epoch below the floor, and is preferred, which counts more.
+        let below = Start {
+            chosen: Some(Slot::A),
+            ..Start::default()
+        };
+        let next = start(Genuine::default(), [Confirmed; 2], below);
+        assert_eq!(next, (run(Slot::A), vec![]));
+    }
+
+    #[test]
+    fn first_start_confirms_a_genuine_image_and_no_image_is_nothing() {
+        let mut part = Genuine {
+            forged: Some(Slot::A),
+            ..Genuine::default()
+        };
+        let next = decide(&mut part, None, Start::default());
+        assert_eq!(
+            (next, &part.written[..]),
+            (Next::Reset, &[[Empty, Confirmed]][..])
+        );
+        part.refuses = true;
+        let next = decide(&mut part, None, Start::default());
+        assert_eq!(next, run(Slot::B), "it is started all the same");
+        part.damaged = Some(Slot::B);
+        assert_eq!(decide(&mut part, None, Start::default()), Next::Nothing);
+    }
+
+    #[test]
+    fn flash_that_cannot_be_written_starts_the_preferred_image() {
+        for states in [
+            [Confirmed, Trial(0)],
+            [Confirmed, New],
+            [Confirmed, Checking],
+        ] {
+            let part = Genuine {
+                refuses: true,
+                ..Genuine::default()
+            };
+            assert_eq!(
+                start(part, states, Start::default()),
+                (run(Slot::A), vec![])
+            );
+        }
+    }
 }

@@ -19,6 +19,7 @@
 
 pub mod commands;
 pub mod decide;
+pub mod genuine;
 pub mod journal;
 
 #[cfg(test)]

@@ -1,29 +1,41 @@
 //! The loader of a modio: chooses which of two images is started, and checks that a new one is genuine. It has no UART,
 //! no command and no protocol.
 //!
-//! [`decide`] has the decisions, [`genuine`] what an image must be. The loader runs on the internal oscillator and
+//! [`decide`] has the decisions, [`genuine`](loader::genuine) what an image must be. The loader runs on the internal oscillator and
 //! leaves everything as after a reset but the watchdog, which cannot be stopped.
 
 #![no_std]
 #![no_main]
 
-mod genuine;
-
 use core::{arch::naked_asm, panic::PanicInfo};
 
 use board_support::{
-    loading::{Loading, slot_bytes},
+    FlashError,
+    fault::{Fault, Kind},
+    kept,
+    loading::{Loading, slot_address, slot_bytes},
     pac, restart,
 };
 use cortex_m_rt::{entry, exception};
 use loader::{
     Record,
     decide::{Next, Part, Start, Unwritten, decide},
-    journal::Journal,
+    genuine,
+    journal::{Journal, JournalError},
 };
 use register_map::{
+    Board,
     layout::HEADER,
     update::{Header, Reason, Slot, intact},
+};
+
+/// The public keys that the loader trusts. The second one stays in a safe.
+const KEYS: [[u8; 32]; 2] = include!(concat!(env!("OUT_DIR"), "/keys.rs"));
+
+/// The board that the loader is built for.
+const BOARD: &Board = match Board::named(board_support::boards::BOARD.name) {
+    Some(board) => board,
+    None => panic!("crate register-map has no row for this board"),
 };
 
 /// The part, and the boot state in its flash.
@@ -52,13 +64,20 @@ impl Part for Unit {
 
     fn check(&mut self, slot: Slot, floor: u16) -> Result<(), Reason> {
         self.loading.run_fast();
-        genuine::check(slot, floor)
+        let (bytes, address) = (slot_bytes(slot as usize), slot_address(slot as usize));
+        genuine::check(bytes, address, BOARD.code as u8, floor, &KEYS)
     }
 
     fn write(&mut self, record: Record) -> Result<(), Unwritten> {
-        self.loading.wait_for_supply();
-        let pages = &mut self.loading.boot_pages();
-        self.journal.write(pages, record).map_err(|_| Unwritten)
+        loop {
+            self.loading.wait_for_supply();
+            let pages = &mut self.loading.boot_pages();
+            match self.journal.write(pages, record) {
+                // The supply has fallen since.
+                Err(JournalError::Flash(FlashError::LowSupply)) => {}
+                written => return written.map_err(|_| Unwritten),
+            }
+        }
     }
 }
 
@@ -70,10 +89,10 @@ fn main() -> ! {
     };
     let (mut loading, found) = Loading::start(device);
     let mut journal = Journal::open(&loading.boot_pages());
-    if journal.is_half_sealed() {
+    if !journal.is_settled() {
         loading.wait_for_supply();
         // When this fails, the state is used as it was read.
-        let _ = journal.seal_again(&mut loading.boot_pages());
+        let _ = journal.settle(&mut loading.boot_pages());
     }
     let record = journal.record();
     let start = Start {
@@ -93,7 +112,16 @@ fn main() -> ! {
     }
 }
 
-/// A failure of the crystal. The next start ends the check that was interrupted.
+/// The crystal has failed. The next start ends the check that was interrupted, and does not use the crystal.
+#[exception]
+unsafe fn NonMaskableInt() -> ! {
+    kept::note(&Fault {
+        kind: Kind::Crystal,
+        ..Fault::default()
+    });
+    restart();
+}
+
 #[exception]
 unsafe fn DefaultHandler(_: i16) {
     restart();
@@ -112,7 +140,7 @@ unsafe extern "C" fn HardFault() -> ! {
     )
 }
 
-/// Never called: `cargo xtask build` checks that the loader contains no panic.
+/// Never called: only salty contains panics, behind checks of indices that are always right.
 #[panic_handler]
 fn panic(_: &PanicInfo<'_>) -> ! {
     restart();

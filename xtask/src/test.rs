@@ -35,7 +35,7 @@ const WORKSPACES: [&str; 3] = ["Cargo.toml", fuzz::MANIFEST, peers::MANIFEST];
 /// The tests of the images that run at the corners: those whose result depends on the clocks, on the time of
 /// instructions and of the flash, or on the converter.
 const AT_CORNERS: &str = "air::requests:: analog_inputs:: boot:: clock:: comm_watchdog:: counters:: dac_faults:: \
-    flash_faults:: hung_task:: in_force:: noise:: outputs_at_start:: points:: power_cut:: pulses:: saving:: \
+    flash_faults:: hung_task:: in_force:: loading::the_ noise:: outputs_at_start:: points:: power_cut:: pulses:: saving:: \
     silences:: timing:: upsets::a_reply";
 const AT_CORNERS_08: &str = "analog:: boot:: power_cut:: saving:: timing::";
 

@@ -2,13 +2,11 @@
 
 use super::{
     region::{read, update},
-    sealed::{ASKED, CAUSE, FLAGS, Sealed, UNSEEN},
+    sealed::{ASKED, CAUSE, CHOSEN, FLAGS, Sealed, UNSEEN},
 };
 
-/// The slot that SW01 = 254 chose at power-on: 0 none, 1 A, 2 B.
-const CHOSEN: u32 = 0b11 << 11;
-/// SW01 was read as 254 at power-on, and no application has been started since.
-const SWITCHED: u32 = 1 << 13;
+/// An application has been started since power-on, so SW01 has no effect any more.
+const USED: u32 = 1 << 13;
 
 /// What the loader needs of the region.
 pub(crate) struct AtLoading {
@@ -16,10 +14,12 @@ pub(crate) struct AtLoading {
     pub asked: bool,
     /// The slot that SW01 = 254 chose at power-on: 0 none, 1 A, 2 B.
     pub chosen: u8,
-    /// SW01 was read as 254 at power-on, and no application has been started since.
-    pub switched: bool,
-    /// SW01 has been read since power-on.
-    pub has_dip: bool,
+    /// SW01 as read at power-on, or `None` before it was read.
+    pub dip: Option<u8>,
+    /// An application has been started since power-on.
+    pub used: bool,
+    /// The crystal has not failed since power-on.
+    pub crystal: bool,
 }
 
 /// Returns the content for the loader, which calls this once at every start, and keeps the reset flags for the
@@ -38,18 +38,14 @@ pub(crate) fn at_loading(cause: u8) -> AtLoading {
     AtLoading {
         asked: flags & ASKED != 0,
         chosen: ((flags & CHOSEN) >> CHOSEN.trailing_zeros()) as u8,
-        switched: flags & SWITCHED != 0,
-        has_dip: sealed.dip().is_some(),
+        dip: sealed.dip(),
+        used: flags & USED != 0,
+        crystal: sealed.record().crystal_faults == 0,
     }
-}
-
-/// Keeps that SW01 was read as 254.
-pub(crate) fn keep_switched() {
-    update(None, FLAGS, 0, SWITCHED);
 }
 
 /// Keeps the slot that SW01 = 254 chose: 0 none, 1 A, 2 B. SW01 has no effect any more.
 pub(crate) fn keep_chosen(slot: u8) {
     let number = u32::from(slot) << CHOSEN.trailing_zeros();
-    update(None, FLAGS, CHOSEN | SWITCHED, number);
+    update(None, FLAGS, CHOSEN, USED | number);
 }

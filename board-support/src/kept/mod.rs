@@ -27,7 +27,7 @@ mod region;
 mod sealed;
 
 #[cfg(all(target_os = "none", feature = "loader"))]
-pub(crate) use loading::{at_loading, keep_chosen, keep_switched};
+pub(crate) use loading::{at_loading, keep_chosen};
 #[cfg(target_os = "none")]
 pub(crate) use region::{at_start, forget, keep_dip, take_cause};
 #[cfg(target_os = "none")]

@@ -33,7 +33,10 @@ pub(super) const ASKED: u32 = 1 << 9;
 /// The application has not seen the reset flags in [`CAUSE`] yet.
 #[cfg(target_os = "none")]
 pub(super) const UNSEEN: u32 = 1 << 8;
-/// The fault was noted since the last start. Bits 11 to 13 are the loader's.
+/// The slot that SW01 = 254 chose at power-on: 0 none, 1 A, 2 B. Bit 13 is the loader's, too.
+#[cfg(target_os = "none")]
+pub(super) const CHOSEN: u32 = 0b11 << 11;
+/// The fault was noted since the last start.
 pub(super) const FRESH: u32 = 1 << 10;
 /// The number of saves left.
 pub(super) const SAVES: u32 = 0x00FF_0000;
@@ -137,6 +140,12 @@ impl Sealed {
     #[cfg(all(target_os = "none", feature = "loader"))]
     pub(super) const fn word(&self, at: usize) -> u32 {
         self.0[at % COPY]
+    }
+
+    /// Returns whether SW01 = 254 chose the slot that runs.
+    #[cfg(target_os = "none")]
+    pub(crate) const fn is_chosen(&self) -> bool {
+        self.0[FLAGS] & CHOSEN != 0
     }
 
     /// Returns the number of saves left, 255 after power-on.

@@ -48,7 +48,7 @@ pub enum Reason {
     Signature = 8,
     /// The check was interrupted.
     Interrupted = 9,
-    /// The image was started three times, and nobody confirmed it.
+    /// The image was started twice, and nobody confirmed it.
     NotConfirmed = 10,
 }
 
@@ -120,12 +120,6 @@ impl State {
             }
             _ => return None,
         })
-    }
-
-    /// Returns whether an image in this state may be started, if its CRC-32 is right.
-    #[must_use]
-    pub const fn may_start(self) -> bool {
-        matches!(self, Self::Trial(_) | Self::Confirmed)
     }
 }
 

@@ -14,8 +14,6 @@ use crate::{
 
 /// Offset of the application in an image, and of fields in the header.
 const APPLICATION: usize = 512;
-const BOARD: usize = 5;
-const ADDRESS: usize = 12;
 const LENGTH: usize = 16;
 const CRC: usize = 20;
 const HASH: usize = 28;
@@ -82,8 +80,12 @@ fn answers(bench: &mut Bench, within: Time) -> Option<Time> {
 }
 
 /// Returns the slot whose code runs.
-fn runs_from(bench: &Bench) -> usize {
+fn runs_from(bench: &mut Bench) -> usize {
     let [a, b] = LAYOUT.board.layout().slots;
+    // A handler may run in RAM.
+    while bench.board.pc() >= RAM {
+        bench.board.run_for(Time::from_us(1));
+    }
     let pc = bench.board.pc();
     assert!(pc >= a, "the loader runs");
     usize::from(pc >= b)
@@ -100,13 +102,14 @@ fn the_first_genuine_image_starts_and_the_next_start_checks_no_signature() {
     ] {
         let mut bench = unit(slots);
         answers(&mut bench, CHECK + START).expect("it starts");
-        assert_eq!(runs_from(&bench), starts);
+        assert_eq!(runs_from(&mut bench), starts);
         assert_eq!(bench.board.resets(), 1, "the loader's, after the check");
         assert_eq!(bench.register(RESET_CAUSE), POWER_ON | PIN | SOFTWARE);
         bench.board.cycle();
         let operations = bench.board.flash_operations();
         answers(&mut bench, START).expect("it starts again");
-        assert_eq!((bench.board.resets(), runs_from(&bench)), (0, starts));
+        assert_eq!(bench.board.resets(), 0);
+        assert_eq!(runs_from(&mut bench), starts);
         assert_eq!(bench.board.flash_operations(), operations);
         assert_eq!(bench.register(RESET_CAUSE), POWER_ON | PIN);
     }
@@ -138,6 +141,7 @@ fn changed(at: usize, bytes: &[u8]) -> Vec<u8> {
     image
 }
 
+/// The loader's own tests sign images for another board, slot or epoch.
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn an_image_with_anything_wrong_is_not_started() {
@@ -150,9 +154,6 @@ fn an_image_with_anything_wrong_is_not_started() {
     for (what, wrong) in [
         ("magic", changed(0, b"MODJ")),
         ("version of the header", changed(4, &[3])),
-        ("board", changed(BOARD, &[2])),
-        ("epoch", changed(6, &[1])),
-        ("address", changed(ADDRESS, &image(1)[ADDRESS..ADDRESS + 4])),
         ("length 0", length(0)),
         ("longest length", length(0xFFFF_FFFC)),
         ("longer", length(whole + 4)),
@@ -181,8 +182,10 @@ fn an_image_with_anything_wrong_is_not_started() {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn without_an_image_the_leds_say_so_and_nothing_is_driven() {
-    let mut bench = unit([&[], &[]]);
-    bench.board.run_for(START);
+    // After the check of a signature the clocks are again those after a reset.
+    let forged = changed(SIGNATURE, &[image(0)[SIGNATURE] ^ 1]);
+    let mut bench = unit([&forged, &[]]);
+    bench.board.run_for(CHECK);
     let mut blinks = 0;
     let mut lit = bench.board.leds().run;
     for _ in 0..1000 {
@@ -216,6 +219,6 @@ fn power_cut_in_a_flash_operation_of_the_first_start_does_no_harm() {
         answers(&mut bench, CHECK + START).expect(&what);
         bench.board.cycle();
         answers(&mut bench, START).expect(&what);
-        assert_eq!(runs_from(&bench), 0);
+        assert_eq!(runs_from(&mut bench), 0);
     }
 }
