@@ -1,8 +1,8 @@
 //! The machine: the Cortex-M3 core with its memories, on the bus with everything else, and the part's power.
 //!
 //! The core is crate rigless's: it translates the firmware's instructions to host code and counts them. Its
-//! time is [`timing`]'s, by the [`costs`] of the [`segment`]s of code that [`execute`] lets it run; its bus is
-//! [`bus`], and [`run`] takes it from event to event.
+//! time is [`timing`]'s, by the [`costs`](crate::costs) of the [`segment`]s of code that [`execute`] lets it run; its
+//! bus is [`bus`], and [`run`] takes it from event to event.
 
 mod answer;
 pub mod bus;
