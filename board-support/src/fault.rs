@@ -2,7 +2,8 @@
 //!
 //! A fault handler notes what happened (`kept::note`) and resets the chip; the next start reads the record. The watchdog
 //! resets the chip without calling a handler. The running firmware therefore keeps what the next start needs to describe
-//! a watchdog reset: the uptime and the marks of its tasks (`kept::marks`). The record lies in the [kept region](crate::kept).
+//! a watchdog reset: the uptime and the marks of its tasks (`kept::marks`). The record lies in the
+//! [kept region](crate::kept).
 
 /// Number of tasks that leave a mark.
 pub const TASKS: usize = 9;

@@ -4,20 +4,10 @@
 const TEXT: &str = register_map::commit!();
 
 /// First 32 bits of the commit; 0 when it is not known.
-pub const COMMIT: u32 = match TEXT.split_at_checked(8) {
-    Some((digits, _)) => number(digits),
-    None => 0,
-};
+pub const COMMIT: u32 = register_map::first_32_bits(TEXT);
 
 /// Value of the register BUILD: bit 0 means that the sources had changes that are not in the commit.
 pub const FLAGS: u16 = match TEXT.as_bytes() {
     [.., b'-', b'd', b'i', b'r', b't', b'y'] => 1,
     _ => 0,
 };
-
-const fn number(digits: &str) -> u32 {
-    match u32::from_str_radix(digits, 16) {
-        Ok(number) => number,
-        Err(_) => panic!("eight hexadecimal digits"),
-    }
-}

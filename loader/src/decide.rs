@@ -46,12 +46,12 @@ pub struct Start {
 /// What the loader does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Next {
-    /// Start the image in this slot. `chosen` is kept over the next reset.
+    /// Start the image in this slot. A choice is kept over the next reset.
     Run {
         /// The slot.
         slot: Slot,
-        /// The slot that SW01 = 254 chose, this one, or none.
-        chosen: Option<Slot>,
+        /// SW01 = 254 chose this slot.
+        chosen: bool,
     },
     /// Reset the part and begin again.
     Reset,
@@ -73,13 +73,13 @@ pub fn decide(part: &mut impl Part, record: Option<Record>, start: Start) -> Nex
         Err(Unwritten) => return preferred(part, &record),
     }
     if let Some(slot) = chosen(part, &record, start) {
-        return Next::Run {
-            slot,
-            chosen: Some(slot),
-        };
+        return Next::Run { slot, chosen: true };
     }
     match on_trial(part, &mut record, start.asked) {
-        Ok(Some(slot)) => Next::Run { slot, chosen: None },
+        Ok(Some(slot)) => Next::Run {
+            slot,
+            chosen: false,
+        },
         Ok(None) | Err(Unwritten) => preferred(part, &record),
     }
 }
@@ -98,7 +98,10 @@ fn first(part: &mut impl Part) -> Next {
     };
     match part.write(record.with(slot, State::Confirmed)) {
         Ok(()) => Next::Reset,
-        Err(Unwritten) => Next::Run { slot, chosen: None },
+        Err(Unwritten) => Next::Run {
+            slot,
+            chosen: false,
+        },
     }
 }
 
@@ -163,7 +166,10 @@ fn preferred(part: &mut impl Part, record: &Record) -> Next {
     let slots = [record.preferred, record.preferred.other()];
     let may = |slot: &Slot| record.state(*slot) == State::Confirmed && part.is_intact(*slot);
     match slots.into_iter().find(may) {
-        Some(slot) => Next::Run { slot, chosen: None },
+        Some(slot) => Next::Run {
+            slot,
+            chosen: false,
+        },
         None => Next::Nothing,
     }
 }
@@ -235,7 +241,10 @@ mod tests {
     }
 
     fn run(slot: Slot) -> Next {
-        Next::Run { slot, chosen: None }
+        Next::Run {
+            slot,
+            chosen: false,
+        }
     }
 
     fn ordinary(states: [State; 2]) -> (Next, Vec<[State; 2]>) {
@@ -284,10 +293,7 @@ mod tests {
 
     #[test]
     fn switch_chooses_the_other_slot_and_the_choice_is_kept() {
-        let chosen = |slot| Next::Run {
-            slot,
-            chosen: Some(slot),
-        };
+        let chosen = |slot| Next::Run { slot, chosen: true };
         let switched = Start {
             switched: true,
             ..Start::default()

@@ -105,7 +105,7 @@ fn main() -> ! {
         // SAFETY: only an intact image is started, and it was found genuine, which includes its address.
         Next::Run { slot, chosen } => unsafe {
             let loading = unit.loading;
-            loading.run(slot as usize, HEADER, chosen.is_some(), &core.SCB)
+            loading.run(slot as usize, HEADER, chosen, &core.SCB)
         },
         Next::Reset => restart(),
         Next::Nothing => unit.loading.show_nothing(),

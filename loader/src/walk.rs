@@ -166,11 +166,11 @@ impl Unit {
                 if let Some(record) = self.record {
                     let is_last_resort = slot != record.preferred
                         && record.state(slot) == State::Confirmed
-                        && chosen.is_none();
+                        && !chosen;
                     assert!(epoch >= record.floor || is_last_resort, "{self:?} {slot:?}");
                 }
                 Some(Self {
-                    chosen,
+                    chosen: chosen.then_some(slot),
                     runs: Some((slot, false)),
                     ..self
                 })
@@ -221,8 +221,10 @@ impl Unit {
         };
         // COMMAND 2.
         after.extend(self.started(true, false));
+        // 0xB002, 0xB003 and 0xB004 end the choice of SW01 = 254.
         let ordered = |record| Self {
             record: Some(record),
+            chosen: None,
             ..self
         };
         if let Ok(record) = running.prepare() {
@@ -240,29 +242,12 @@ impl Unit {
         }
         let intact = self.content(other) != Nothing;
         if let Some(record) = running.finish().ok().filter(|_| intact) {
-            let unit = ordered(record);
-            after.extend(
-                Self {
-                    chosen: None,
-                    ..unit
-                }
-                .started(false, false),
-            );
+            after.extend(ordered(record).started(false, false));
         }
-        after.push(Self {
-            chosen: None,
-            ..ordered(running.confirm(epoch))
-        });
+        after.push(ordered(running.confirm(epoch)));
         let back = running.go_back(self.content(other).epoch());
         if let Some(record) = back.ok().filter(|_| intact) {
-            let unit = ordered(record);
-            after.extend(
-                Self {
-                    chosen: None,
-                    ..unit
-                }
-                .started(false, false),
-            );
+            after.extend(ordered(record).started(false, false));
         }
         after
     }

@@ -28,6 +28,22 @@ macro_rules! version {
     };
 }
 
+/// Returns the first 32 bits of a commit, as [`commit!`](crate::commit!) writes it; 0 when it is not known.
+///
+/// # Panics
+///
+/// When the text does not begin with eight hexadecimal digits, though it has eight characters or more.
+#[must_use]
+pub const fn first_32_bits(commit: &str) -> u32 {
+    let Some((digits, _)) = commit.split_at_checked(8) else {
+        return 0;
+    };
+    match u32::from_str_radix(digits, 16) {
+        Ok(number) => number,
+        Err(_) => panic!("eight hexadecimal digits"),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     #[test]

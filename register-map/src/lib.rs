@@ -48,6 +48,7 @@ mod values;
 
 pub use block::{Block, Scope, Text};
 pub use board::Board;
+pub use commit::first_32_bits;
 #[doc(hidden)]
 pub use git_version::git_version;
 pub use module::{Module, UnknownModule};

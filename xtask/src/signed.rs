@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use anyhow::{Context as _, Result, ensure};
 use ed25519_dalek::{Signer as _, SigningKey};
 use fs_err as fs;
-use register_map::Board;
 use register_map::layout::HEADER;
 use register_map::part::FLASH_BASE;
 use register_map::update::{Slot, crc32};
+use register_map::{Board, first_32_bits};
 use semver::Version;
 use sha2::{Digest as _, Sha512};
 
@@ -128,7 +128,7 @@ pub fn of_slot(
     put(10, &(version.patch as u16).to_le_bytes());
     put(12, &address.to_le_bytes());
     put(16, &(application.len() as u32).to_le_bytes());
-    put(24, &commit().to_le_bytes());
+    put(24, &first_32_bits(register_map::commit!()).to_le_bytes());
     put(28, &Sha512::digest(&application));
     let crc = crc32([&header[..20], &application]);
     header[20..24].copy_from_slice(&crc.to_le_bytes());
@@ -138,14 +138,6 @@ pub fn of_slot(
     header[156..160].copy_from_slice(&fingerprint[..4]);
     header.extend(application);
     Ok(header)
-}
-
-/// Returns the first 32 bits of the commit, 0 outside a repository.
-fn commit() -> u32 {
-    let digits = register_map::commit!().get(..8);
-    digits
-        .and_then(|digits| u32::from_str_radix(digits, 16).ok())
-        .unwrap_or_default()
 }
 
 /// Returns the file of an update: both images, each padded to 128 bytes, and the manifest.
