@@ -172,6 +172,12 @@ codes! {
         DropChanges = 4 "drop unsaved changes",
         ClearWatchdogFlag = 5 "clear the watchdog flag",
         Identify = 6 "identify",
+        /// Only behind the loader, as the commands below.
+        Prepare = 0xB001 "prepare an update",
+        Finish = 0xB002 "check the update and start it",
+        Confirm = 0xB003 "keep the running image",
+        GoBack = 0xB004 "start the other image",
+        RestartAs255 = 0xB007 "restart as with SW01 = 255",
     }
 }
 

@@ -68,7 +68,7 @@ block! {
     /// Frames with a gap above t1.5
     STRICT_T15 "STRICT_T15": 0x0107 x 1, Value::Codes(GapRule::NAMES), Rule::restart(Values::up_to(1), 0);
     /// Runs after the response. Reads 0
-    COMMAND "COMMAND": 0x0108 x 1, Value::Codes(Command::NAMES), Rule::now(Values::range(1, 6), 0);
+    COMMAND "COMMAND": 0x0108 x 1, Value::Codes(Command::NAMES), Rule::now(Values::OneOf(Command::CODES), 0);
     /// Requests that restart COMM_TIMEOUT
     COMM_SOURCE "COMM_SOURCE": 0x0109 x 1, Value::Codes(CommSource::NAMES), Rule::now(Values::up_to(3), 0);
     /// Module in the slot

@@ -71,7 +71,24 @@ pub mod reset_cause {
 }
 
 /// Names of the bits of BUILD.
-const BUILD_NAMES: &[(u8, &str)] = &[(0, "sources differ from the commit")];
+const BUILD_NAMES: &[(u8, &str)] = &[
+    (0, "sources differ from the commit"),
+    (1, "signed with the development key"),
+    (2, "no loader"),
+    (3, "the loader accepts the development key"),
+];
+
+/// Bits of UPDATE.
+pub mod update {
+    /// The slot that runs: 1 A, 2 B, 0 no loader.
+    pub const SLOT: u16 = 0b11;
+    /// Lowest bit of the code of the other slot's state, bits 2 to 4.
+    pub const OTHER_SHIFT: u32 = 2;
+    /// The running image is on trial.
+    pub const TRIAL: u16 = 1 << 5;
+    /// SW01 = 254 chose the running slot.
+    pub const SWITCHED: u16 = 1 << 6;
+}
 
 block! {
     "Identity and state", 0x0200..=0x025F;
@@ -108,6 +125,8 @@ block! {
     MODULE_STATE "module state": 0x0218 x 8, Value::Codes(ModuleState::NAMES), READ;
     /// 96 bits
     UNIQUE_ID "unique device identity": 0x0220 x 6, Value::Opaque, READ;
+    /// Bits 0-1 running slot, 2-4 state of the other slot, 5 trial, 6 SW01 = 254
+    UPDATE "update": 0x022A x 1, Value::Opaque, READ;
     /// Good frames; counters wrap
     BUS_MESSAGES "bus messages": 0x0230 x 1, Value::NUMBER, READ;
     /// Bad CRC or character, too short or too long
