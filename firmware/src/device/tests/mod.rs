@@ -6,6 +6,7 @@ mod files;
 mod over_the_air;
 mod points;
 mod state;
+mod updating;
 
 use std::vec::Vec;
 
