@@ -41,18 +41,23 @@ pub fn image(slot: usize) -> Vec<u8> {
     BUILT.1[slot].clone()
 }
 
-/// Returns the image for a slot with changes, signed again with the development key.
+/// Returns the image for a slot with changes, and with the hash and the signature that belong to it.
 pub fn signed(slot: usize, change: impl FnOnce(&mut [u8])) -> Vec<u8> {
     let mut image = image(slot);
     change(&mut image);
-    let key = include_str!("../../../../loader/keys/development.key").trim();
-    let key = core::array::from_fn(|n| u8::from_str_radix(&key[2 * n..][..2], 16).unwrap());
     let hash = Sha512::digest(&image[APPLICATION..]);
     image[HASH..HASH + 64].copy_from_slice(&hash);
-    with_crc(&mut image);
+    sign(&mut image);
+    image
+}
+
+/// Gives an image the CRC-32 and the signature of the development key that belong to its header.
+pub fn sign(image: &mut [u8]) {
+    with_crc(image);
+    let digits = include_str!("../../../../loader/keys/development.key").trim();
+    let key = core::array::from_fn(|n| u8::from_str_radix(&digits[2 * n..][..2], 16).unwrap());
     let signature = SigningKey::from_bytes(&key).sign(&image[..SIGNATURE]);
     image[SIGNATURE..SIGNATURE + 64].copy_from_slice(&signature.to_bytes());
-    image
 }
 
 /// Gives an image the CRC-32 that belongs to it.
@@ -77,12 +82,13 @@ pub fn unit(slots: [&[u8]; 2], settings: &[(u16, u16)]) -> Bench {
         let at = offset(address);
         flash[at..at + image.len()].copy_from_slice(image);
     }
-    holding(flash)
+    holding(flash, 1)
 }
 
-/// Returns a board just powered on, with these bytes in its flash.
-pub fn holding(flash: Vec<u8>) -> Bench {
+/// Returns a board just powered on, with these bytes in its flash and this switch.
+pub fn holding(flash: Vec<u8>, dip: u8) -> Bench {
     let config = Config {
+        dip,
         chip: chip::Config::holding(flash),
         ..Config::default()
     };
@@ -94,12 +100,17 @@ pub fn holding(flash: Vec<u8>) -> Bench {
 
 /// Runs until the unit answers, and returns that time.
 pub fn answers(bench: &mut Bench, within: Time) -> Option<Time> {
+    answers_as(bench, 1, within)
+}
+
+/// Runs until the unit answers with this address, and returns that time.
+pub fn answers_as(bench: &mut Bench, unit: u8, within: Time) -> Option<Time> {
     let end = bench.board.now() + within;
     while bench.board.now() < end {
         bench.board.run_for(Time::from_ms(20));
-        if bench.ask(1, &[3, 2, 5, 0, 1]).is_some() {
-            assert_eq!(bench.register(0x0205), LAYOUT.board.code);
-            assert_eq!(bench.register(0x020F + PORT), 1, "the stored module");
+        if bench.ask(unit, &[3, 2, 5, 0, 1]).is_some() {
+            let module = bench.ask(unit, &[3, 2, 0x0F + PORT as u8, 0, 1]);
+            assert_eq!(module.as_deref(), Some(&[3, 2, 0, 1][..]), "it is stored");
             assert_eq!(bench.board.findings(), []);
             return Some(bench.board.now());
         }
