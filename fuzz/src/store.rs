@@ -215,7 +215,8 @@ impl Life {
     }
 }
 
-fn mess(script: &mut Script<'_>) -> Mess {
+/// Returns what a power cut leaves of the operation.
+pub(crate) fn mess(script: &mut Script<'_>) -> Mess {
     let kind = script.byte();
     let operand = script.half();
     let place = usize::from(operand) % (PAGE_SIZE + 1);
