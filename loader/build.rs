@@ -13,14 +13,25 @@ fn main() {
     println!("cargo::rerun-if-env-changed=MODIO_KEYS");
     let file = env::var("MODIO_KEYS").unwrap_or_else(|_| DEVELOPMENT.to_owned());
     println!("cargo::rerun-if-changed={file}");
-    let text = fs::read_to_string(&file).unwrap_or_else(|error| panic!("{file}: {error}"));
-    let keys: Vec<Vec<u8>> = text.lines().map(|line| bytes(line, &file)).collect();
+    let keys = keys(&file);
     assert!(
         matches!(&keys[..], [first, second] if first.len() == 32 && second.len() == 32),
         "{file}: two lines of 64 hexadecimal digits are needed, the public keys"
     );
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
-    fs::write(out.join("keys.rs"), format!("{keys:?}")).expect("OUT_DIR is writable");
+    let development = keys.contains(&self::keys(DEVELOPMENT)[0]);
+    for (name, text) in [
+        ("keys.rs", format!("{keys:?}")),
+        ("development.rs", format!("{development}")),
+    ] {
+        fs::write(out.join(name), text).expect("OUT_DIR is writable");
+    }
+}
+
+/// Returns the public keys of a file, one in each line.
+fn keys(file: &str) -> Vec<Vec<u8>> {
+    let text = fs::read_to_string(file).unwrap_or_else(|error| panic!("{file}: {error}"));
+    text.lines().map(|line| bytes(line, file)).collect()
 }
 
 fn bytes(line: &str, file: &str) -> Vec<u8> {

@@ -7,7 +7,8 @@ use stm32f1xx_hal::{
 };
 
 use crate::{
-    ClockSource, DacBus, Flash, IoPin, Rs485, Rs485Timer, Sampler, ScanTimer, Watchdog,
+    ClockSource, CrcUnit, DacBus, Flash, IoPin, Rs485, Rs485Timer, SLOT, Sampler, ScanTimer,
+    Watchdog,
     boards::BOARD,
     clock,
     design::{CRYSTAL_FAULTS, DIP_POLL_US, DIP_SETTLE_CYCLES},
@@ -26,12 +27,6 @@ use crate::{
 const WATCHDOG: u8 = 1 << 2;
 const POWER_ON: u8 = 1 << 4;
 
-/// Whether the application is linked for a slot behind the loader.
-const HAS_LOADER: bool = cfg!(any(feature = "slot-a", feature = "slot-b"));
-
-/// The position of SW01 for recovery mode.
-const RECOVERY: u8 = 255;
-
 /// The board's devices.
 pub struct Board {
     /// Clock source of the core.
@@ -41,8 +36,14 @@ pub struct Board {
     pub reset_cause: u8,
     /// The last fault before this start.
     pub faults: FaultRecord,
-    /// SW01 as a number from 0 to 255, as read at power-on; 255 if SW01 = 254 chose the slot that runs.
+    /// SW01 as a number from 0 to 255, as read at power-on.
     pub dip: u8,
+    /// This start is one as with SW01 = 255, COMMAND 0xB007.
+    pub as_255: bool,
+    /// SW01 = 254 chose the slot that runs.
+    pub chosen: bool,
+    /// The loader trusts the development key.
+    pub development: bool,
     /// Number of saves that were left before the reset, 255 after power-on.
     pub saves_left: u8,
     /// Seconds from power-on to this start.
@@ -55,6 +56,8 @@ pub struct Board {
     pub dacs: DacBus,
     /// The flash pages that keep data without power.
     pub flash: Flash,
+    /// The unit that computes the CRC-32 of an image.
+    pub crc: CrcUnit,
     /// The LEDs for activity and fault, which high lights, and for running, which low lights. All are off.
     pub leds: [IoPin; 3],
     /// The timer that starts each scan, not started yet.
@@ -104,10 +107,10 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
     vectors::move_to_ram(scb);
     let mut rcc = device.RCC;
     // Behind the loader, it has read and cleared the flags.
-    let reset_cause = if HAS_LOADER {
+    let (reset_cause, development) = if SLOT.is_some() {
         kept::take_cause()
     } else {
-        take_reset_cause(&rcc)
+        (take_reset_cause(&rcc), false)
     };
     let watchdog = Watchdog::start(device.IWDG, &device.DBGMCU);
     let kept = kept::at_start(reset_cause & (WATCHDOG | POWER_ON) == WATCHDOG);
@@ -120,12 +123,8 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
     // Configure the driver-enable pin first, so that nothing is sent on the bus.
     rs485::set_up_pins();
 
-    let dip = match kept.dip() {
-        // The switch has chosen the slot, so it names no unit address.
-        Some(_) if HAS_LOADER && kept.is_chosen() => RECOVERY,
-        Some(dip) => dip,
-        None => switch(clock.core_mhz()),
-    };
+    let dip = kept.dip();
+    let dip = dip.unwrap_or_else(|| switch(clock.core_mhz()));
 
     // PC13 must not be faster than 2 MHz nor drive more than 3 mA (DS5319 table 5, notes).
     let leds = [
@@ -147,12 +146,16 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
         reset_cause,
         faults,
         dip,
+        as_255: kept::take_as_255(),
+        chosen: kept.is_chosen(),
+        development,
         saves_left: kept.saves(),
         powered_s: kept.started(),
         unique_id: unique_id::read(),
         sampler: Sampler::new(device.ADC1),
         dacs: DacBus::new(device.I2C1, clock),
         flash: Flash::new(device.FLASH, device.PWR, masked),
+        crc: CrcUnit::new(device.CRC, &mut rcc),
         leds,
         scan_timer: ScanTimer::new(device.TIM4, clock, &mut rcc),
         watchdog,

@@ -1,4 +1,4 @@
-//! The flash, which holds the program and the two pages that keep data without power (RM0008 3.3, PM0075 2.3).
+//! The flash, which holds the program and the pages that keep data without power (RM0008 3.3, PM0075 2.3).
 //!
 //! An operation stalls every read of flash: 40 to 70 us for a half-word, 20 to 40 ms for a page. Code in RAM
 //! continues. The operation is therefore started and polled from RAM, and only interrupts whose handlers are in RAM
@@ -18,7 +18,7 @@ use stm32f1xx_hal::pac;
 
 use crate::{
     design::{FLASH_ERASE_US, FLASH_PROGRAM_US, PVD_LEVEL, SYSCLK_ON_HSE_HZ},
-    pages::{Page, Pages},
+    pages::{Page, Pages, Slot},
 };
 
 /// Key sequence that unlocks the controller (PM0075 2.3.1).
@@ -53,7 +53,8 @@ enum Operation {
 ///
 /// # Safety
 ///
-/// `place` must be a half-word of the store to which no reference is alive; `page` must be a page of the store.
+/// `place` must be a half-word without code of this program, to which no reference is alive; `page` must be a page
+/// without such code, to which none is alive.
 #[inline(never)]
 #[unsafe(link_section = ".ram_code")]
 unsafe fn run(
@@ -208,10 +209,13 @@ unsafe extern "C" {
     /// The first page of the store. The second one follows.
     static _store: u8;
     /// The first page of the boot state. The second one follows.
-    #[cfg(feature = "loader")]
     static _boot: u8;
     /// Its address is the number of bytes of a page.
     static _page_bytes: u8;
+    static _slot_a: u8;
+    static _slot_b: u8;
+    /// Its address is the number of bytes of a slot.
+    static _slot_bytes: u8;
 }
 
 fn page_bytes() -> u32 {
@@ -282,15 +286,12 @@ impl Pages for Flash {
 }
 
 /// The pages of the boot state.
-#[cfg(feature = "loader")]
-pub struct BootPages<'a>(pub(crate) &'a mut Flash);
+pub struct BootPages<'a>(pub &'a mut Flash);
 
-#[cfg(feature = "loader")]
 fn boot() -> u32 {
     &raw const _boot as u32
 }
 
-#[cfg(feature = "loader")]
 impl Pages for BootPages<'_> {
     type Error = FlashError;
 
@@ -304,5 +305,86 @@ impl Pages for BootPages<'_> {
 
     fn erase(&mut self, page: Page) -> Result<(), FlashError> {
         self.0.erase_of(boot(), page)
+    }
+}
+
+/// Returns the address of a slot: 0 is A, 1 is B.
+#[must_use]
+pub fn slot_address(slot: usize) -> u32 {
+    (if slot == 0 {
+        &raw const _slot_a
+    } else {
+        &raw const _slot_b
+    }) as u32
+}
+
+fn slot_len() -> usize {
+    &raw const _slot_bytes as usize
+}
+
+/// A slot of flash that does not run.
+pub struct OtherSlot<'a> {
+    flash: &'a mut Flash,
+    address: u32,
+}
+
+impl Flash {
+    /// Returns the slot that does not run, or `None` without a loader.
+    pub fn other_slot(&mut self) -> Option<OtherSlot<'_>> {
+        let address = slot_address(1 - crate::SLOT?);
+        Some(OtherSlot {
+            flash: self,
+            address,
+        })
+    }
+
+    /// Returns the slot that runs, or `None` without a loader.
+    #[must_use]
+    pub fn running_slot() -> Option<&'static [u8]> {
+        // SAFETY: the program never changes the slot that it runs from.
+        crate::SLOT.map(|slot| unsafe { slot_bytes(slot) })
+    }
+}
+
+/// Returns the bytes of a slot.
+///
+/// # Safety
+///
+/// The slot must never change.
+pub(crate) unsafe fn slot_bytes(slot: usize) -> &'static [u8] {
+    let first = ptr::with_exposed_provenance(slot_address(slot) as usize);
+    // SAFETY: a slot of flash is always readable, and by the caller's promise it never changes.
+    unsafe { slice::from_raw_parts(first, slot_len()) }
+}
+
+impl Slot for OtherSlot<'_> {
+    type Error = FlashError;
+
+    fn bytes(&self) -> &[u8] {
+        let first = ptr::with_exposed_provenance(self.address as usize);
+        // SAFETY: as in `Flash::page_of`.
+        unsafe { slice::from_raw_parts(first, slot_len()) }
+    }
+
+    fn page_bytes(&self) -> usize {
+        page_bytes() as usize
+    }
+
+    fn program(&mut self, offset: usize, half: u16) -> Result<(), FlashError> {
+        if offset >= slot_len() || !offset.is_multiple_of(2) {
+            return Err(FlashError::Failed);
+        }
+        let place = (self.address + offset as u32) as *mut u16;
+        // SAFETY: the half-word belongs to the slot that does not run, and no reference to it is alive (`&mut self`).
+        unsafe { self.flash.operate(Operation::Program { place, half }) }
+    }
+
+    fn erase(&mut self, page: usize) -> Result<(), FlashError> {
+        if page >= slot_len() / self.page_bytes() {
+            return Err(FlashError::Failed);
+        }
+        let page = self.address + page as u32 * page_bytes();
+        // SAFETY: the page belongs to the slot that does not run.
+        unsafe { self.flash.operate(Operation::Erase { page }) }
     }
 }

@@ -25,7 +25,7 @@ mod adc;
 pub mod board;
 #[cfg(target_os = "none")]
 mod clock;
-#[cfg(all(target_os = "none", feature = "loader"))]
+#[cfg(target_os = "none")]
 mod crc_unit;
 #[cfg(any(target_os = "none", test))]
 mod dip;
@@ -66,6 +66,7 @@ mod watchdog;
 pub use {
     adc::Sampler,
     clock::ClockSource,
+    crc_unit::CrcUnit,
     flash::{Flash, FlashError},
     gap_timer::Rs485Timer,
     i2c::DacBus,
@@ -77,6 +78,15 @@ pub use {
     scan_timer::ScanTimer,
     stm32f1xx_hal::pac,
     watchdog::Watchdog,
+};
+
+/// The slot behind the loader that this program is linked for: 0 is A, 1 is B.
+pub const SLOT: Option<usize> = if cfg!(feature = "slot-a") {
+    Some(0)
+} else if cfg!(feature = "slot-b") {
+    Some(1)
+} else {
+    None
 };
 
 /// Restarts the device by a software reset, which immediately makes every pin a floating input.

@@ -1,7 +1,5 @@
 //! What the loader does with the part. Slots are numbered: 0 is A, 1 is B.
 
-use core::{ptr, slice};
-
 use cortex_m::{asm, peripheral::SCB};
 use stm32f1xx_hal::{
     pac,
@@ -14,7 +12,7 @@ use crate::{
     clock,
     crc_unit::CrcUnit,
     design::LOADER_MHZ,
-    flash::BootPages,
+    flash::{self, BootPages, slot_address},
     kept,
     pin::{Mode, Pin},
     wait::wait_us,
@@ -45,11 +43,13 @@ const OTHER_SLOT: u8 = 254;
 
 impl Loading {
     /// Starts the watchdog, reads what was kept over the reset, and reads SW01 after a power-on.
+    ///
+    /// `development`: the loader trusts the development key, which the application reports.
     #[must_use]
-    pub fn start(device: pac::Peripherals) -> (Self, Found) {
+    pub fn start(device: pac::Peripherals, development: bool) -> (Self, Found) {
         let mut rcc = device.RCC;
         let watchdog = Watchdog::start_loader(device.IWDG, &device.DBGMCU);
-        let kept = kept::at_loading(take_reset_cause(&rcc));
+        let kept = kept::at_loading(take_reset_cause(&rcc), development);
         let dip = kept.dip.unwrap_or_else(|| {
             set_up_ports(&mut rcc);
             switch(LOADER_MHZ)
@@ -135,28 +135,9 @@ impl Loading {
     }
 }
 
-unsafe extern "C" {
-    static _slot_a: u8;
-    static _slot_b: u8;
-    /// Its address is the number of bytes of a slot.
-    static _slot_bytes: u8;
-}
-
-/// Returns the address of a slot.
-#[must_use]
-pub fn slot_address(slot: usize) -> u32 {
-    (if slot == 0 {
-        &raw const _slot_a
-    } else {
-        &raw const _slot_b
-    }) as u32
-}
-
 /// Returns the bytes of a slot.
 #[must_use]
 pub fn slot_bytes(slot: usize) -> &'static [u8] {
-    let bytes = &raw const _slot_bytes as usize;
-    let first = ptr::with_exposed_provenance(slot_address(slot) as usize);
-    // SAFETY: a slot of flash is always readable, and the loader never changes it.
-    unsafe { slice::from_raw_parts(first, bytes) }
+    // SAFETY: the loader never changes a slot.
+    unsafe { flash::slot_bytes(slot) }
 }

@@ -1,4 +1,4 @@
-//! The flash pages that keep data without power, as the store sees them.
+//! The flash pages that keep data without power, and a slot for an image, as those see them that write them.
 //!
 //! docs/decisions.md says why these are not the traits of embedded-storage.
 
@@ -47,4 +47,30 @@ pub trait Pages {
     ///
     /// When the flash reports an error.
     fn erase(&mut self, page: Page) -> Result<(), Self::Error>;
+}
+
+/// A slot of such a flash, for an image.
+pub trait Slot {
+    /// Error of an operation.
+    type Error;
+
+    /// Returns the bytes of the slot.
+    fn bytes(&self) -> &[u8];
+
+    /// Returns the bytes of a page. The slot begins at a page and has whole pages.
+    fn page_bytes(&self) -> usize;
+
+    /// Programs a half-word at an even offset, as [`Pages::program`].
+    ///
+    /// # Errors
+    ///
+    /// When the flash reports an error.
+    fn program(&mut self, offset: usize, half: u16) -> Result<(), Self::Error>;
+
+    /// Erases a page of the slot, as [`Pages::erase`].
+    ///
+    /// # Errors
+    ///
+    /// When the flash reports an error.
+    fn erase(&mut self, page: usize) -> Result<(), Self::Error>;
 }

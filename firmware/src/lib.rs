@@ -15,3 +15,4 @@ pub mod radio;
 pub mod repairs;
 pub mod start_up;
 pub mod store;
+pub mod update;

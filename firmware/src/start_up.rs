@@ -10,7 +10,7 @@ pub enum Address {
     /// Serve the line as unit [`RECOVERY_UNIT`] with the factory's line settings, so that a unit with unknown
     /// settings can be reached.
     Recovery,
-    /// Not a unit address (0 and 248 to 254): send nothing and blink the fault LED.
+    /// Not a unit address (0 and 248 to 253, without a loader 254, too): send nothing and blink the fault LED.
     Invalid,
 }
 
@@ -18,11 +18,13 @@ pub enum Address {
 pub const RECOVERY_UNIT: u8 = 255;
 
 impl Address {
-    /// Returns the meaning of the switch's number.
+    /// Returns the meaning of the switch's number. Behind the loader, 254 has chosen the other image at power-on, and
+    /// serves as 255 does.
     #[must_use]
-    pub const fn from_dip(dip: u8) -> Self {
+    pub const fn from_dip(dip: u8, has_loader: bool) -> Self {
         match dip {
             1..=247 => Self::Unit(dip),
+            254 if has_loader => Self::Recovery,
             RECOVERY_UNIT => Self::Recovery,
             0 | 248..=254 => Self::Invalid,
         }
@@ -61,9 +63,14 @@ mod tests {
                 255 => Some(255),
                 _ => None,
             };
-            assert_eq!(Address::from_dip(dip).unit(), expected, "{dip}");
+            assert_eq!(Address::from_dip(dip, false).unit(), expected, "{dip}");
+            if dip != 254 {
+                let both = [true, false].map(|loader| Address::from_dip(dip, loader));
+                assert_eq!(both[0], both[1], "{dip}");
+            }
         }
-        assert_eq!(Address::from_dip(255), Address::Recovery);
+        assert_eq!(Address::from_dip(255, false), Address::Recovery);
+        assert_eq!(Address::from_dip(254, true), Address::Recovery);
     }
 
     #[test]

@@ -92,7 +92,8 @@ impl Unit {
         let reply = self.server.serve(request, &mut self.device);
         self.port.send(reply, 0);
         if let Some(command) = self.device.end_request() {
-            self.device.carry_out(command);
+            self.device
+                .carry_out(command, firmware::config::LineName::Rs485);
         }
         let mut reply: Vec<u8> = self.port.start().into_iter().collect();
         while let Some(byte) = self.port.next_byte() {

@@ -12,8 +12,9 @@ use core::{arch::naked_asm, panic::PanicInfo};
 use board_support::{
     FlashError,
     fault::{Fault, Kind},
+    flash::slot_address,
     kept,
-    loading::{Loading, slot_address, slot_bytes},
+    loading::{Loading, slot_bytes},
     pac, restart,
 };
 use cortex_m_rt::{entry, exception};
@@ -31,6 +32,9 @@ use register_map::{
 
 /// The public keys that the loader trusts. The second one stays in a safe.
 const KEYS: [[u8; 32]; 2] = include!(concat!(env!("OUT_DIR"), "/keys.rs"));
+
+/// Whether one of them is the development key, whose private half everybody has.
+const DEVELOPMENT: bool = include!(concat!(env!("OUT_DIR"), "/development.rs"));
 
 /// The board that the loader is built for.
 const BOARD: &Board = match Board::named(board_support::boards::BOARD.name) {
@@ -87,7 +91,7 @@ fn main() -> ! {
     else {
         restart();
     };
-    let (mut loading, found) = Loading::start(device);
+    let (mut loading, found) = Loading::start(device, DEVELOPMENT);
     let mut journal = Journal::open(&loading.boot_pages());
     if !journal.is_settled() {
         loading.wait_for_supply();

@@ -17,7 +17,6 @@
 
 use core::ops::RangeInclusive;
 
-use crate::exception::first_of;
 use crate::{Adu, DataModel, Exception, Span, Words, WordsOut};
 
 /// The only reference type.
@@ -136,7 +135,7 @@ pub(crate) fn check(
                 model.check_read_file(group.file, records)
             }
         });
-        result = first_of(result, checked);
+        result = Exception::first_of(result, checked);
     }
     result.map(|()| reply)
 }

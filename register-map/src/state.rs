@@ -70,13 +70,23 @@ pub mod reset_cause {
     ];
 }
 
-/// Names of the bits of BUILD.
-const BUILD_NAMES: &[(u8, &str)] = &[
-    (0, "sources differ from the commit"),
-    (1, "signed with the development key"),
-    (2, "no loader"),
-    (3, "the loader accepts the development key"),
-];
+/// Bits of BUILD. Bit 0: the sources differ from the commit.
+pub mod build {
+    /// The running image is signed with the development key.
+    pub const DEVELOPMENT_SIGNED: u16 = 1 << 1;
+    /// There is no loader, so nothing is signed.
+    pub const NO_LOADER: u16 = 1 << 2;
+    /// The loader accepts the development key.
+    pub const DEVELOPMENT_TRUSTED: u16 = 1 << 3;
+
+    /// Every bit with its name.
+    pub const NAMES: &[(u8, &str)] = &[
+        (0, "sources differ from the commit"),
+        (1, "signed with the development key"),
+        (2, "no loader"),
+        (3, "the loader accepts the development key"),
+    ];
+}
 
 /// Bits of UPDATE.
 pub mod update {
@@ -116,7 +126,7 @@ block! {
     /// First 32 bits; 0 = not known
     COMMIT "commit": 0x020C x 2, Value::Opaque, READ;
     /// How the firmware was built
-    BUILD "build": 0x020E x 1, Value::Bits(BUILD_NAMES), READ;
+    BUILD "build": 0x020E x 1, Value::Bits(build::NAMES), READ;
     /// CRC-16 of file 1
     DESCRIPTION_CRC "description CRC": 0x020F x 1, Value::Opaque, READ;
     /// It changes at a restart

@@ -2,7 +2,7 @@
 
 use super::{
     region::{read, update},
-    sealed::{ASKED, CAUSE, CHOSEN, FLAGS, Sealed, UNSEEN},
+    sealed::{ASKED, CAUSE, CHOSEN, DEVELOPMENT, FLAGS, Sealed, UNSEEN},
 };
 
 /// An application has been started since power-on, so SW01 has no effect any more.
@@ -23,8 +23,9 @@ pub(crate) struct AtLoading {
 }
 
 /// Returns the content for the loader, which calls this once at every start, and keeps the reset flags for the
-/// application. Those of an earlier start of the loader that no application has seen are kept, too.
-pub(crate) fn at_loading(cause: u8) -> AtLoading {
+/// application. Those of an earlier start of the loader that no application has seen are kept, too. `development`: the
+/// loader trusts the development key.
+pub(crate) fn at_loading(cause: u8, development: bool) -> AtLoading {
     let mut sealed = Sealed::after_power_on();
     sealed.load(read);
     let flags = sealed.word(FLAGS);
@@ -34,7 +35,8 @@ pub(crate) fn at_loading(cause: u8) -> AtLoading {
     } else {
         u32::MAX
     };
-    update(None, CAUSE, unseen, UNSEEN | u32::from(cause));
+    let development = if development { DEVELOPMENT } else { 0 };
+    update(None, CAUSE, unseen, UNSEEN | development | u32::from(cause));
     AtLoading {
         asked: flags & ASKED != 0,
         chosen: ((flags & CHOSEN) >> CHOSEN.trailing_zeros()) as u8,

@@ -29,9 +29,11 @@ mod sealed;
 #[cfg(all(target_os = "none", feature = "loader"))]
 pub(crate) use loading::{at_loading, keep_chosen};
 #[cfg(target_os = "none")]
-pub(crate) use region::{at_start, forget, keep_dip, take_cause};
+pub(crate) use region::{at_start, forget, keep_dip, take_as_255, take_cause};
 #[cfg(target_os = "none")]
-pub use region::{keep_asked, keep_pulses, keep_saves, keep_uptime, marks, note, pulses};
+pub use region::{
+    end_choice, keep_as_255, keep_asked, keep_pulses, keep_saves, keep_uptime, marks, note, pulses,
+};
 
 /// Words of one copy of the sealed part: 11 words, room for fields to come, and the CRC-32.
 const COPY: usize = 16;

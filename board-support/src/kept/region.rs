@@ -13,7 +13,10 @@ use core::{
 
 use super::{
     COPY, MARKS, PULSES, UPTIME, WORDS, live,
-    sealed::{self, ASKED, CAUSE, DIP, FLAGS, FRESH, HAS_DIP, SAVES, STARTED, Sealed, UNSEEN},
+    sealed::{
+        self, AS_255, ASKED, CAUSE, CHOSEN, DEVELOPMENT, DIP, FLAGS, FRESH, HAS_DIP, SAVES,
+        STARTED, Sealed, UNSEEN,
+    },
 };
 use crate::fault::{ENDED, Fault, Kind, TASKS};
 
@@ -96,11 +99,20 @@ pub(crate) fn at_start(by_watchdog: bool) -> Sealed {
     Sealed::copy(0, read)
 }
 
-/// Returns the reset flags that the loader kept, once.
-pub(crate) fn take_cause() -> u8 {
+/// Returns the reset flags that the loader kept, once, and whether it trusts the development key.
+pub(crate) fn take_cause() -> (u8, bool) {
     let cause = read(CAUSE);
     update(None, CAUSE, UNSEEN, 0);
-    cause as u8 & 0b11_1111
+    (cause as u8 & 0b11_1111, cause & DEVELOPMENT != 0)
+}
+
+/// Returns whether this start is one as with SW01 = 255, once.
+pub(crate) fn take_as_255() -> bool {
+    let as_255 = read(FLAGS) & AS_255 != 0;
+    if as_255 {
+        update(None, FLAGS, AS_255, 0);
+    }
+    as_255
 }
 
 /// Notes a fault. For panic and fault handlers. Only the first fault since the start is noted.
@@ -124,6 +136,16 @@ pub fn keep_saves(left: u8) {
 /// Keeps that the restart that now follows was asked for. For the background task.
 pub fn keep_asked() {
     update(None, FLAGS, 0, ASKED);
+}
+
+/// Keeps that the restart that now follows is one as with SW01 = 255. For the background task.
+pub fn keep_as_255() {
+    update(None, FLAGS, 0, AS_255);
+}
+
+/// Ends the choice of SW01 = 254. For the background task.
+pub fn end_choice() {
+    update(None, FLAGS, CHOSEN, 0);
 }
 
 /// Keeps the seconds since power-on. For the scan, at least once a second.

@@ -33,6 +33,12 @@ pub(super) const ASKED: u32 = 1 << 9;
 /// The application has not seen the reset flags in [`CAUSE`] yet.
 #[cfg(target_os = "none")]
 pub(super) const UNSEEN: u32 = 1 << 8;
+/// The loader trusts the development key.
+#[cfg(target_os = "none")]
+pub(super) const DEVELOPMENT: u32 = 1 << 9;
+/// This restart is one as with SW01 = 255, COMMAND 0xB007.
+#[cfg(target_os = "none")]
+pub(super) const AS_255: u32 = 1 << 14;
 /// The slot that SW01 = 254 chose at power-on: 0 none, 1 A, 2 B. Bit 13 is the loader's, too.
 #[cfg(target_os = "none")]
 pub(super) const CHOSEN: u32 = 0b11 << 11;

@@ -11,12 +11,14 @@ use crate::{
     installed::AnalogOutputs,
     log::{Event, Log},
     persistence::Persistence,
+    updating::Updating,
 };
 
 /// The state of the background task.
 pub struct Background {
     pub analog_outputs: AnalogOutputs,
     pub persistence: Persistence,
+    pub updating: Updating,
     pub leds: Leds<IoPin>,
     pub log: Log,
     pub stack: LowWater,
@@ -49,6 +51,7 @@ impl Background {
             (identify, device.any_fails(), millis, radio, saves)
         });
         kept::keep_saves(saves);
+        self.updating.work(self.persistence.flash(), device);
         if let Some(works) = radio
             && self.radio.replace(works) != radio
         {

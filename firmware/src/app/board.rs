@@ -2,13 +2,16 @@
 
 use board_support::boards;
 use firmware::device::Fixed;
-use register_map::Board;
+use register_map::{Board, layout::Layout};
 
 /// The board's row in the register map, found by name.
 pub const BOARD: &Board = match Board::named(boards::BOARD.name) {
     Some(board) => board,
     None => panic!("the register map has no row for this board"),
 };
+
+/// Where the images are in flash.
+pub const LAYOUT: &Layout = &BOARD.layout();
 
 /// The fixed part of the self-description of every unit with this board.
 pub const DESCRIPTION: &Fixed = &Fixed::of(BOARD);

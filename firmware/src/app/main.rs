@@ -37,6 +37,7 @@ mod scanning;
 mod serving;
 mod start;
 mod trap;
+mod updating;
 mod upkeep;
 
 #[rtic::app(device = board_support::pac, peripherals = true)]

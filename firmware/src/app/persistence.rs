@@ -6,6 +6,7 @@
 use board_support::{Flash, flash::FlashError, kept};
 use firmware::{
     config::Settings,
+    device::Restart,
     store::{Operation, Saving, Store, StoreError},
 };
 use rtic::Mutex;
@@ -46,11 +47,22 @@ impl Persistence {
     pub fn work(&mut self, device: &mut impl Mutex<T = &'static mut Device>) -> Option<Event> {
         let (save, restart) = device.lock(|device| (device.config.is_saving(), device.restart));
         let event = if save { self.save(device) } else { None };
-        if restart && self.saving.is_none() {
-            kept::keep_asked();
+        if let Some(restart) = restart
+            && self.saving.is_none()
+        {
+            match restart {
+                Restart::Asked => kept::keep_asked(),
+                Restart::As255 => kept::keep_as_255(),
+                Restart::Update => kept::end_choice(),
+            }
             board_support::restart();
         }
         event
+    }
+
+    /// Returns the flash, for other work than saves.
+    pub const fn flash(&mut self) -> &mut Flash {
+        &mut self.pages
     }
 
     /// Erases the page that is no longer needed, if there is one, so that the next save does not have to. This

@@ -78,7 +78,7 @@ impl Serving {
             && rs485.lock(|line| line.as_ref().is_some_and(|line| !line.is_replying()))
         {
             self.rs485.order = None;
-            execute(order, device);
+            execute(order, self.rs485.line, device);
         }
         // Only a restart affects a reply that is on its way. The other commands are executed before the master can
         // have the reply, because a command of the other line may follow it.
@@ -90,7 +90,7 @@ impl Serving {
             })
         {
             self.radio.order = None;
-            execute(order, device);
+            execute(order, self.radio.line, device);
         }
         let mut served = false;
         // The next request waits until the command has been executed.
@@ -177,7 +177,7 @@ impl Served {
 
 /// Executes the command of a request whose reply has been sent, or passes it on to the background task.
 #[inline(never)]
-fn execute(order: Command, device: &mut impl Mutex<T = &'static mut Device>) {
-    device.lock(|device| device.carry_out(order));
+fn execute(order: Command, line: LineName, device: &mut impl Mutex<T = &'static mut Device>) {
+    device.lock(|device| device.carry_out(order, line));
     rtic::pend(Interrupt::EXTI0);
 }

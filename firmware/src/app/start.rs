@@ -3,15 +3,15 @@
 use core::mem::MaybeUninit;
 
 use board_support::{
-    RadioUart, ScanTimer, Watchdog, board, boards::SLOTS, flash::FlashError, gap::LineTimes, kept,
-    pac, stack::LowWater, uart,
+    Flash, RadioUart, SLOT, ScanTimer, Watchdog, board, boards::SLOTS, flash::FlashError,
+    gap::LineTimes, kept, pac, stack::LowWater, uart,
 };
 use cortex_m::peripheral::SCB;
 use firmware::{
     config::{self, Config, LineConfig, RadioConfig},
     device::Identity,
     leds::{Leds, Trouble},
-    start_up::{self, Address},
+    start_up::{self, Address, RECOVERY_UNIT},
     store::{Store, StoreError},
 };
 use modbus_server::{
@@ -21,7 +21,8 @@ use modbus_server::{
 use modio_drivers::DacLink;
 use register_map::{
     codes::{Format, GapRule, Mode},
-    state::reset_cause::POWER_ON,
+    state::{build as build_bits, reset_cause::POWER_ON},
+    update::{DEVELOPMENT_KEY, Header},
 };
 
 use crate::{
@@ -35,6 +36,7 @@ use crate::{
     radio::{Radio, Serial},
     scanning::Scanning,
     serving::Serving,
+    updating::Updating,
 };
 
 /// The highest priority of a task whose code is in flash.
@@ -75,7 +77,12 @@ pub fn up(
     let mut log = Log::new();
     let masked = rtic::export::cortex_logical2hw(SERVE_PRIORITY, pac::NVIC_PRIO_BITS);
     let mut board = board::setup(device, scb, masked);
-    let address = Address::from_dip(board.dip);
+    let dip = if board.as_255 {
+        RECOVERY_UNIT
+    } else {
+        board.dip
+    };
+    let address = Address::from_dip(dip, SLOT.is_some());
 
     let mut pages = board.flash;
     let mut store = Store::open(&pages);
@@ -101,8 +108,11 @@ pub fn up(
         unique_id: board.unique_id,
         fault: fault_record::words(&board.faults),
         internal_oscillator: !board.clock.is_crystal(),
+        build: build(board.development),
     };
     let device = place.write(Device::new(config, identity, DESCRIPTION));
+    let updating = Updating::new(&mut pages, board.crc);
+    device.update = updating.update(&mut pages, board.chosen);
     for (slot, port) in device.points.ports_mut().iter_mut().enumerate() {
         port.set_pulses(kept::pulses(slot));
     }
@@ -195,6 +205,7 @@ pub fn up(
         background: Background {
             analog_outputs,
             persistence: Persistence::new(store, pages, erase),
+            updating,
             leds: Leds::new(
                 board.leds,
                 Trouble::at_start(address, board.clock.is_crystal()),
@@ -206,6 +217,17 @@ pub fn up(
         scan_timer: board.scan_timer,
         watchdog: board.watchdog,
     }
+}
+
+/// Returns the bits of the register BUILD that depend on loader and slot. `trusted`: the loader trusts the development
+/// key.
+fn build(trusted: bool) -> u16 {
+    let Some(slot) = Flash::running_slot() else {
+        return build_bits::NO_LOADER;
+    };
+    let signed = Header::of(slot).is_ok_and(|header| header.key() == DEVELOPMENT_KEY);
+    let bit = |mask, set| if set { mask } else { 0 };
+    bit(build_bits::DEVELOPMENT_SIGNED, signed) | bit(build_bits::DEVELOPMENT_TRUSTED, trusted)
 }
 
 /// Returns a limit for the duration of a reply in microseconds: the longest frame, with 2 % and a millisecond in

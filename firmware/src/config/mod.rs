@@ -151,6 +151,19 @@ impl<const SLOTS: usize> Config<SLOTS> {
         }
     }
 
+    /// Returns whether the request that is being served is for all units.
+    #[must_use]
+    pub const fn is_broadcast(&self) -> bool {
+        self.origin.broadcast
+    }
+
+    /// Keeps the lock open for as long as after a write, if it is open for the request.
+    pub const fn keep_open(&mut self) {
+        if self.is_unlocked() {
+            self.lock.open(self.origin.line);
+        }
+    }
+
     /// Returns whether the lock is open for the request.
     const fn is_unlocked(&self) -> bool {
         self.lock.is_open(self.origin.line)

@@ -30,6 +30,8 @@ use modbus_server::{
     Bits, BitsOut, DataModel, Exception, Server, Span, Table, TextOut, Words, WordsOut,
 };
 use modio_drivers::CHANNELS;
+use register_map::configuration::COMMAND;
+use register_map::update::status;
 use register_map::{codes::Command, counters, fault, radio, state as state_map};
 
 pub use comm_watchdog::CommWatchdog;
@@ -39,7 +41,8 @@ pub use points::Points;
 pub use port::IoPort;
 pub use state::{Identity, State};
 
-use crate::config::{Config, Origin, Point};
+use crate::config::{Config, LineName, Origin, Point};
+use crate::update::{Order, TRIAL_S, Update};
 
 /// The device behind the line, on a board with `SLOTS` slots.
 #[derive(Debug)]
@@ -55,13 +58,26 @@ pub struct Device<const SLOTS: usize> {
     /// A command from a request, to be executed when its reply has been sent.
     ordered: Option<Command>,
     /// The device is to restart once no save is under way.
-    pub restart: bool,
+    pub restart: Option<Restart>,
+    /// The update over the line; `None` without a loader.
+    pub update: Option<Update>,
     /// The LEDs are to blink.
     pub identify: bool,
     /// A request for this unit has been served since the LEDs were last updated.
     pub activity: bool,
     /// Revision of the configuration whose settings the points have.
     revision: u16,
+}
+
+/// A restart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Restart {
+    /// COMMAND 2. It does not count as a start on trial.
+    Asked,
+    /// COMMAND 0xB007: the next start is one as with SW01 = 255.
+    As255,
+    /// The boot state has changed, or nobody has confirmed the image on trial.
+    Update,
 }
 
 /// The block of the address space that contains the start of a span. The span must not leave the block.
@@ -110,7 +126,8 @@ impl<const SLOTS: usize> Device<SLOTS> {
             description: Description::new(description, &config),
             comm_watchdog: CommWatchdog::new(),
             ordered: None,
-            restart: false,
+            restart: None,
+            update: None,
             identify: false,
             activity: false,
             revision: config.revision(),
@@ -146,6 +163,10 @@ impl<const SLOTS: usize> Device<SLOTS> {
         self.config.tick(ms);
         let timeout_ms = self.config.comm_timeout_ms();
         let tripped = self.comm_watchdog.check(self.state.millis(), timeout_ms);
+        if self.state.uptime_s() >= TRIAL_S && self.update.as_ref().is_some_and(Update::is_on_trial)
+        {
+            self.restart = Some(Restart::Update);
+        }
         if tripped {
             self.points.ports_mut().iter_mut().for_each(IoPort::go_safe);
         }
@@ -183,18 +204,53 @@ impl<const SLOTS: usize> Device<SLOTS> {
         self.ordered.take()
     }
 
-    /// Executes a command whose reply has been sent. The background task does what is left: a save that has begun,
+    /// Executes a command of this line whose reply has been sent. The background task does what is left: a save that has begun,
     /// a restart, identify.
-    pub fn carry_out(&mut self, order: Command) {
+    pub fn carry_out(&mut self, order: Command, line: LineName) {
         match order {
             Command::Save => self.config.begin_save(),
-            Command::Restart => self.restart = true,
+            Command::Restart => self.restart = Some(Restart::Asked),
+            Command::RestartAs255 => self.restart = Some(Restart::As255),
             Command::LoadDefaults => self.config.load_defaults(),
             Command::DropChanges => self.config.drop_changes(),
             Command::ClearWatchdogFlag => self.comm_watchdog.clear(),
             Command::Identify => self.identify = true,
+            Command::Prepare | Command::Finish | Command::Confirm | Command::GoBack => {
+                self.order_update(order, line);
+            }
         }
         self.settings_may_have_changed();
+    }
+
+    /// Passes an order to the update. A preparation costs a save of the budget.
+    fn order_update(&mut self, order: Command, line: LineName) {
+        if let Some(update) = &mut self.update
+            && let Some(order) = Order::of(order)
+            && (order != Order::Prepare || self.config.take_save().is_some())
+        {
+            update.take(order, line);
+        }
+    }
+
+    /// Checks whether a write of the configuration may give the order of an update that it contains, if any.
+    fn check_order(&self, span: Span, words: Words<'_>) -> Result<(), Exception> {
+        let code = words.get(COMMAND.wrapping_sub(span.start()));
+        let Some(command) = code.and_then(Command::from_code).filter(is_of_update) else {
+            return Ok(());
+        };
+        let Some(update) = &self.update else {
+            return Err(Exception::IllegalDataValue);
+        };
+        let allowed = match Order::of(command) {
+            Some(Order::Prepare) if self.config.saves_left() == 0 => false,
+            Some(order) => update.check(order).is_ok(),
+            None => true,
+        };
+        if allowed && !self.config.is_broadcast() {
+            Ok(())
+        } else {
+            Err(Exception::ServerDeviceBusy)
+        }
     }
 
     #[inline(always)]
@@ -223,10 +279,16 @@ impl<const SLOTS: usize> Device<SLOTS> {
     fn state_word(&self, address: u16) -> u16 {
         match address {
             state_map::STATUS => self.status(),
+            state_map::UPDATE => self.update.as_ref().map_or(0, Update::register),
             state_map::DESCRIPTION_CRC => self.description.crc(),
             address => self.state.word(address, &self.points, &self.config),
         }
     }
+}
+
+/// Returns whether a command exists only behind the loader.
+const fn is_of_update(command: &Command) -> bool {
+    command.code() >= Command::Prepare.code()
 }
 
 /// Checks whether a span lies in a block of read-only registers and contains no gap.
@@ -264,7 +326,10 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
     fn check_write_words(&self, span: Span, words: Words<'_>) -> Result<(), Exception> {
         match Block::of(span) {
             Block::Points => self.points.check_write_words(span, words),
-            Block::Config => self.config.check_write(span, words),
+            Block::Config => Exception::first_of(
+                self.config.check_write(span, words),
+                self.check_order(span, words),
+            ),
             Block::State | Block::Fault | Block::Radio => Err(Exception::IllegalDataAddress),
             Block::Pulses => {
                 check_exists(counters::SPANS, span)?;
@@ -321,18 +386,48 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
         }
     }
 
-    /// The self-description is a file.
+    /// The self-description is file 1. Behind the loader, file 2 is the state of an update, and the images are files
+    /// that can be written.
     fn has_files(&self) -> bool {
         true
     }
 
     fn check_read_file(&self, file: u16, records: Span) -> Result<(), Exception> {
-        self.description.check_read::<SLOTS>(file, records)
+        match &self.update {
+            Some(update) if file == status::FILE => update.check_read(records),
+            _ => self.description.check_read::<SLOTS>(file, records),
+        }
     }
 
-    /// File 1, the only one.
-    fn read_file(&self, _: u16, records: Span, out: &mut WordsOut<'_>) {
-        self.description.read(&self.config, records, out);
+    fn read_file(&self, file: u16, records: Span, out: &mut WordsOut<'_>) {
+        match &self.update {
+            Some(update) if file == status::FILE => {
+                let records = records.addresses();
+                records.for_each(|record| out.push(update.record(record)));
+            }
+            _ => self.description.read(&self.config, records, out),
+        }
+    }
+
+    fn check_write_file(
+        &self,
+        file: u16,
+        records: Span,
+        words: Words<'_>,
+    ) -> Result<(), Exception> {
+        let Some(update) = &self.update else {
+            return Err(Exception::IllegalDataAddress);
+        };
+        let line = self.config.origin_line();
+        update.check_write(file, records, words, line)?;
+        self.config.check_line()
+    }
+
+    fn write_file(&mut self, file: u16, records: Span, words: Words<'_>) {
+        if let Some(update) = &mut self.update {
+            update.write(file, records, words);
+            self.config.keep_open();
+        }
     }
 
     /// Returns the low byte of the status register.

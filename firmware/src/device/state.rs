@@ -22,6 +22,8 @@ pub struct Identity {
     pub fault: [u16; fault_words()],
     /// The core runs on the internal oscillator.
     pub internal_oscillator: bool,
+    /// Bits of the register BUILD that depend on loader and slot.
+    pub build: u16,
 }
 
 const fn fault_words() -> usize {
@@ -157,7 +159,7 @@ impl State {
             at::STACK_FREE => self.stack_free,
             at::COMMIT => commit_high,
             0x020D => commit_low,
-            at::BUILD => built::FLAGS,
+            at::BUILD => built::FLAGS | self.identity.build,
             at::MODULE_IN_FORCE.. => self.by_index(address, points, config),
             _ => 0,
         }

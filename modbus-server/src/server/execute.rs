@@ -2,7 +2,6 @@
 
 use super::{Diagnostics, Server};
 use crate::diagnostic::Diagnostic;
-use crate::exception::first_of;
 use crate::{
     Adu, BitsOut, DataModel, Exception, Function, Span, Table, Words, WordsOut, file,
     identification, pdu,
@@ -128,7 +127,7 @@ pub(super) fn execute(
         }
         Function::ReadWriteMultipleRegisters => {
             let (read, write, words) = pdu::write_then_read(fields)?;
-            first_of(
+            Exception::first_of(
                 model.check_write_words(write, words),
                 model.check_read_words(Table::HoldingRegisters, read),
             )?;

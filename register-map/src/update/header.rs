@@ -15,7 +15,7 @@
 
 use crc::{CRC_32_MPEG_2, Crc, NoTable};
 
-use super::Reason;
+use super::{BLOCK_BYTES, Reason};
 
 /// Bytes of the header.
 const BYTES: usize = crate::layout::HEADER as usize;
@@ -31,9 +31,9 @@ const VERSION: u8 = 2;
 /// First byte of the area that is zero.
 const ZERO: usize = 160;
 
-/// The header of an image.
+/// The header of an image, or the first bytes of one.
 #[derive(Clone, Copy, Debug)]
-pub struct Header<'a>(&'a [u8; BYTES]);
+pub struct Header<'a>(&'a [u8]);
 
 impl<'a> Header<'a> {
     /// Returns the header at the beginning of a slot.
@@ -42,24 +42,27 @@ impl<'a> Header<'a> {
     ///
     /// [`Reason::Magic`] if there is none.
     pub fn of(slot: &'a [u8]) -> Result<Self, Reason> {
-        let (bytes, _) = slot.split_first_chunk().ok_or(Reason::Magic)?;
-        let header = Self(bytes);
+        let bytes: &[u8; BYTES] = slot.first_chunk().ok_or(Reason::Magic)?;
         let zero = bytes[ZERO..].iter().all(|byte| *byte == 0);
-        if header.array(0) == MAGIC && bytes[4] == VERSION && zero {
-            Ok(header)
-        } else {
-            Err(Reason::Magic)
-        }
+        Self::beginning(bytes).filter(|_| zero).ok_or(Reason::Magic)
+    }
+
+    /// Returns the header whose first bytes these are, if its magic number and its version are right.
+    #[must_use]
+    pub fn beginning(bytes: &'a [u8]) -> Option<Self> {
+        let header = Self(bytes);
+        (header.array(0) == MAGIC && header.array(4) == [VERSION]).then_some(header)
     }
 
     fn array<const N: usize>(&self, at: usize) -> [u8; N] {
-        core::array::from_fn(|n| self.0[(at + n) % BYTES])
+        core::array::from_fn(|n| self.0.get(at + n).copied().unwrap_or_default())
     }
 
     /// Returns the board's code.
     #[must_use]
-    pub const fn board(&self) -> u8 {
-        self.0[5]
+    pub fn board(&self) -> u8 {
+        let [board] = self.array(5);
+        board
     }
 
     /// Returns the security epoch.
@@ -107,7 +110,7 @@ impl<'a> Header<'a> {
     /// Returns the bytes that are signed.
     #[must_use]
     pub fn signed(&self) -> &'a [u8] {
-        &self.0[..SIGNED]
+        self.0.get(..SIGNED).unwrap_or_default()
     }
 
     /// Returns the Ed25519 signature.
@@ -137,17 +140,41 @@ impl<'a> Header<'a> {
         }
     }
 
+    /// Returns the blocks of the image, in a slot with this number of bytes.
+    ///
+    /// # Errors
+    ///
+    /// [`Reason::Length`] unless the bytes of the application are a multiple of 4, 512 or more, and fit the slot.
+    pub fn blocks(&self, slot: usize) -> Result<u16, Reason> {
+        let length = self.length() as usize;
+        let fits = length >= LEAST && length <= slot.saturating_sub(BYTES);
+        if fits && length.is_multiple_of(4) {
+            Ok((BYTES + length).div_ceil(BLOCK_BYTES) as u16)
+        } else {
+            Err(Reason::Length)
+        }
+    }
+
     /// Returns the application, in the slot that begins with this header.
     ///
     /// # Errors
     ///
-    /// [`Reason::Length`] unless its bytes are a multiple of 4, 512 or more, and fit the slot.
+    /// As [`Self::blocks`].
     pub fn application<'b>(&self, slot: &'b [u8]) -> Result<&'b [u8], Reason> {
-        let length = self.length() as usize;
-        let application = slot.get(BYTES..).and_then(|rest| rest.get(..length));
-        application
-            .filter(|_| length >= LEAST && length.is_multiple_of(4))
-            .ok_or(Reason::Length)
+        self.blocks(slot.len())?;
+        let rest = slot.get(BYTES..).unwrap_or_default();
+        rest.get(..self.length() as usize).ok_or(Reason::Length)
+    }
+
+    /// Returns the records of file 2 that describe the image.
+    #[must_use]
+    pub fn words(&self) -> [u16; 8] {
+        let ([major, minor], patch) = self.version();
+        let words = |long: u32| [(long >> 16) as u16, long as u16];
+        let ([c1, c0], [k1, k0]) = (words(self.commit()), words(self.key()));
+        let version = u16::from_be_bytes([major, minor]);
+        let blocks = self.blocks(usize::MAX).unwrap_or_default();
+        [version, patch, self.epoch(), c1, c0, blocks, k1, k0]
     }
 }
 
@@ -177,7 +204,8 @@ pub fn intact<'a>(
 ) -> Result<Header<'a>, Reason> {
     let header = Header::of(slot)?;
     let application = header.application(slot)?;
-    if crc([&header.0[..IN_CRC], application]) == header.crc() {
+    let covered = header.0.get(..IN_CRC).unwrap_or_default();
+    if crc([covered, application]) == header.crc() {
         Ok(header)
     } else {
         Err(Reason::Crc)
@@ -214,6 +242,7 @@ mod tests {
         assert_eq!(header.version(), ([0, 3], 4));
         assert_eq!((header.address(), header.length()), (0x0800_4000, 1024));
         assert_eq!(header.commit(), 0xABCD_1234);
+        assert_eq!(header.words(), [3, 4, 7, 0xABCD, 0x1234, 12, 0, 0]);
         assert_eq!(header.suits(1, 0x0800_4000), Ok(()));
         assert_eq!(header.suits(2, 0x0800_4000), Err(Reason::Board));
         assert_eq!(header.suits(1, 0x0801_1800), Err(Reason::Address));

@@ -69,6 +69,9 @@ impl Reason {
     ];
 }
 
+/// First bytes of the SHA-512 of the public development key, whose private half everybody has.
+pub const DEVELOPMENT_KEY: u32 = 0x11FA_5AB8;
+
 /// Number of starts that an image on trial has. A start that was asked for does not count.
 pub const TRIALS: u8 = 2;
 

@@ -1,4 +1,5 @@
-//! How an image reaches a unit: as file records, functions 14 and 15 (V1.1b3 6.14, 6.15). A record is one word.
+//! How an image reaches a unit: as file records, functions 14 and 15 (V1.1b3 6.14, 6.15). A record is one word, whose high
+//! byte is the earlier byte of the image.
 
 use core::ops::Range;
 

@@ -6,6 +6,7 @@ mod files;
 mod over_the_air;
 mod points;
 mod state;
+mod updating;
 
 use std::vec::Vec;
 
@@ -44,6 +45,7 @@ impl<const SLOTS: usize> Bench<SLOTS> {
             unique_id: [1, 2, 3, 4, 5, 6],
             fault: [3; 16],
             internal_oscillator: false,
+            build: 0,
         };
         Self {
             device: Device::new(
@@ -74,7 +76,7 @@ impl<const SLOTS: usize> Bench<SLOTS> {
         let reply = self.server.serve(request, &mut self.device);
         port.send(reply, 0);
         if let Some(order) = self.device.end_request() {
-            self.device.carry_out(order);
+            self.device.carry_out(order, LineName::Rs485);
         }
         let mut reply: Vec<u8> = port.start().into_iter().collect();
         while let Some(byte) = port.next_byte() {

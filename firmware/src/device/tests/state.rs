@@ -114,7 +114,7 @@ fn identify_and_restart_are_left_for_the_background_task() {
     bench.unlock();
     assert_eq!(bench.write(at::COMMAND, &[7]), Err(3));
     assert_eq!(bench.write(at::COMMAND, &[6]), Ok(()));
-    assert!(bench.device.identify && !bench.device.restart);
+    assert!(bench.device.identify && bench.device.restart.is_none());
     assert_eq!(bench.write(at::COMMAND, &[2]), Ok(()));
-    assert!(bench.device.restart);
+    assert_eq!(bench.device.restart, Some(Restart::Asked));
 }

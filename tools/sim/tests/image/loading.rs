@@ -1,95 +1,18 @@
 //! The loader, with signed images in its slots: which one it starts at the first power-on, and what it refuses.
 
-use std::{fs, sync::LazyLock};
-
 use register_map::state::RESET_CAUSE;
 use register_map::state::reset_cause::{PIN, POWER_ON, SOFTWARE};
-use register_map::update::crc32;
-use sim::{Config, Image, Time, chip};
+use sim::Time;
 
 use crate::{
     LAYOUT,
-    bench::{Bench, PAGE_SIZE, PORT, flash_with_settings, pages, path},
+    slots::{
+        APPLICATION, CHECK, CRC, HASH, KEY, LENGTH, SIGNATURE, START, answers, image, runs_from,
+        unit, with_crc,
+    },
 };
 
-/// Offset of the application in an image, and of fields in the header.
-const APPLICATION: usize = 512;
-const LENGTH: usize = 16;
-const CRC: usize = 20;
-const HASH: usize = 28;
-const SIGNATURE: usize = 92;
-const KEY: usize = 156;
 const RAM: u32 = 0x2000_0000;
-
-/// Time from power-on to the first answer, when the loader checks no signature.
-const START: Time = Time::from_ms(400);
-/// The longest check of an image, at the slow corner.
-const CHECK: Time = Time::from_ms(4_000);
-
-/// The loader, and the images for slots A and B.
-static BUILT: LazyLock<(Image, [Vec<u8>; 2])> = LazyLock::new(|| {
-    let image = |name| fs::read(path(name)).expect("the image can be read");
-    (
-        Image::read(&path("MODIO_LOADER")).expect("the loader can be read"),
-        [image("MODIO_A"), image("MODIO_B")],
-    )
-});
-
-/// Returns the image for a slot, 0 or 1.
-fn image(slot: usize) -> Vec<u8> {
-    BUILT.1[slot].clone()
-}
-
-/// Returns a board just powered on, with these images in its slots and one module in its configuration.
-fn unit(slots: [&[u8]; 2]) -> Bench {
-    let layout = LAYOUT.board.layout();
-    let offset = |address: u32| (address - 0x0800_0000) as usize;
-    let mut flash = flash_with_settings(&[(0x010F + PORT, 1)]);
-    let [stored, _] = pages();
-    let page = flash[stored.clone()].to_vec();
-    flash[stored].fill(0xFF);
-    let store = offset(layout.store.first);
-    flash[store..store + PAGE_SIZE].copy_from_slice(&page);
-    for (address, image) in layout.slots.into_iter().zip(slots) {
-        let at = offset(address);
-        flash[at..at + image.len()].copy_from_slice(image);
-    }
-    let config = Config {
-        chip: chip::Config::holding(flash),
-        ..Config::default()
-    };
-    let mut bench = Bench::of(&BUILT.0, config);
-    // The loader's reset after a check.
-    bench.tolerant = true;
-    bench
-}
-
-/// Runs until the unit answers, and returns that time.
-fn answers(bench: &mut Bench, within: Time) -> Option<Time> {
-    let end = bench.board.now() + within;
-    while bench.board.now() < end {
-        bench.board.run_for(Time::from_ms(20));
-        if bench.ask(1, &[3, 2, 5, 0, 1]).is_some() {
-            assert_eq!(bench.register(0x0205), LAYOUT.board.code);
-            assert_eq!(bench.register(0x020F + PORT), 1, "the stored module");
-            assert_eq!(bench.board.findings(), []);
-            return Some(bench.board.now());
-        }
-    }
-    None
-}
-
-/// Returns the slot whose code runs.
-fn runs_from(bench: &mut Bench) -> usize {
-    let [a, b] = LAYOUT.board.layout().slots;
-    // A handler may run in RAM.
-    while bench.board.pc() >= RAM {
-        bench.board.run_for(Time::from_us(1));
-    }
-    let pc = bench.board.pc();
-    assert!(pc >= a, "the loader runs");
-    usize::from(pc >= b)
-}
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
@@ -100,7 +23,7 @@ fn the_first_genuine_image_starts_and_the_next_start_checks_no_signature() {
         ([&[], &b[..]], 1),
         ([&a[..], &b[..]], 0),
     ] {
-        let mut bench = unit(slots);
+        let mut bench = unit(slots, &[]);
         answers(&mut bench, CHECK + START).expect("it starts");
         assert_eq!(runs_from(&mut bench), starts);
         assert_eq!(bench.board.resets(), 1, "the loader's, after the check");
@@ -119,7 +42,7 @@ fn the_first_genuine_image_starts_and_the_next_start_checks_no_signature() {
 #[ignore = "needs the image: cargo xtask test"]
 fn the_application_starts_within_100_ms_of_the_reset() {
     let (a, b) = (image(0), image(1));
-    let mut bench = unit([&a, &b]);
+    let mut bench = unit([&a, &b], &[]);
     answers(&mut bench, CHECK + START).expect("it starts");
     let [slot, _] = LAYOUT.board.layout().slots;
     bench.board.cycle();
@@ -136,8 +59,7 @@ fn the_application_starts_within_100_ms_of_the_reset() {
 fn changed(at: usize, bytes: &[u8]) -> Vec<u8> {
     let mut image = image(0);
     image[at..at + bytes.len()].copy_from_slice(bytes);
-    let crc = crc32([&image[..CRC], &image[APPLICATION..]]);
-    image[CRC..CRC + 4].copy_from_slice(&crc.to_le_bytes());
+    with_crc(&mut image);
     image
 }
 
@@ -169,7 +91,7 @@ fn an_image_with_anything_wrong_is_not_started() {
         ("cut short", a[..last].to_vec()),
         ("image for slot B", image(1)),
     ] {
-        let mut bench = unit([&wrong, &[]]);
+        let mut bench = unit([&wrong, &[]], &[]);
         while !bench.board.leds().fault {
             bench.board.run_for(Time::from_ms(20));
             assert!(bench.board.now() < CHECK, "{what}");
@@ -184,7 +106,7 @@ fn an_image_with_anything_wrong_is_not_started() {
 fn without_an_image_the_leds_say_so_and_nothing_is_driven() {
     // After the check of a signature the clocks are again those after a reset.
     let forged = changed(SIGNATURE, &[image(0)[SIGNATURE] ^ 1]);
-    let mut bench = unit([&forged, &[]]);
+    let mut bench = unit([&forged, &[]], &[]);
     bench.board.run_for(CHECK);
     let mut blinks = 0;
     let mut lit = bench.board.leds().run;
@@ -208,7 +130,7 @@ fn power_cut_in_a_flash_operation_of_the_first_start_does_no_harm() {
     // The erase of a page, half-words of the record, the first of its CRC-32, and both seals. The tests of the loader's
     // journal cut every operation.
     for (n, operation) in [1, 2, 5, 8, 10, 11].into_iter().enumerate() {
-        let mut bench = unit([&a, &b]);
+        let mut bench = unit([&a, &b], &[]);
         let fraction = [0.0, 0.5, 0.75, 1.0][n % 4];
         bench.board.cut_in_flash_operation(operation, fraction);
         bench.board.run_for(CHECK);

@@ -16,7 +16,7 @@
 //! | configuration | `in_force`, `storing`, `saving`, `save_budget`, `flash_faults`, `power_cut` |
 //! | the simulator | `cores`: boards of one process share translated code |
 //! | the radio | `radio`, `air` |
-//! | the loader | `loading` |
+//! | the loader, and an update over the line | `loading`, `updating` |
 //! | safety | `boot`, `clock`, `outputs_at_start`, `comm_watchdog`, `hung_task`, `faults`, `upsets`, `kept`, `stack`, `log`, `long_run` |
 
 use sim::board::{Layout, MODIO_02};
@@ -57,7 +57,9 @@ mod save_budget;
 mod saving;
 mod self_description;
 mod silences;
+mod slots;
 mod stack;
 mod storing;
 mod timing;
+mod updating;
 mod upsets;

@@ -1,0 +1,122 @@
+//! The steps of an update by the background task: flash of the slot that does not run, and the boot state.
+
+use board_support::{
+    CrcUnit, Flash, SLOT,
+    flash::{BootPages, FlashError},
+    kept,
+    pages::Slot as _,
+};
+use firmware::{
+    device::Restart,
+    update::{After, Done, InSlot, Job, Update, described},
+};
+use loader::{
+    Record,
+    journal::{Journal, JournalError},
+};
+use register_map::update::Slot;
+use rtic::Mutex;
+
+use crate::{
+    board::{BOARD, Device, LAYOUT},
+    clock,
+};
+
+/// Time between two erases, in which everything that waited runs, in milliseconds.
+const PAUSE_MS: u32 = 10;
+
+/// The boot state, and the steps under way.
+pub struct Updating {
+    journal: Journal,
+    crc: CrcUnit,
+    /// Time of the last erase.
+    erased: u32,
+}
+
+impl Updating {
+    pub fn new(flash: &mut Flash, crc: CrcUnit) -> Self {
+        Self {
+            journal: Journal::open(&BootPages(flash)),
+            crc,
+            erased: 0,
+        }
+    }
+
+    /// Returns the update of a device behind the loader. `switched`: SW01 = 254 chose the slot.
+    pub fn update(&self, flash: &mut Flash, switched: bool) -> Option<Update> {
+        let slot = Slot::ALL.get(SLOT?).copied()?;
+        let running = described(Flash::running_slot().unwrap_or_default());
+        let images = [running, other(flash)];
+        Some(Update::new(
+            BOARD.code as u8,
+            LAYOUT,
+            slot,
+            self.journal.record(),
+            images,
+            switched,
+        ))
+    }
+
+    /// Performs the steps that are due: at most one erase, or all blocks that are staged.
+    pub fn work(&mut self, flash: &mut Flash, device: &mut impl Mutex<T = &'static mut Device>) {
+        loop {
+            let next = device.lock(|device| device.update.as_ref()?.next());
+            let Some(job) = next else { return };
+            let erases = matches!(job, Job::InSlot(InSlot::Erase(_)));
+            if erases && clock::millis().wrapping_sub(self.erased) < PAUSE_MS {
+                return;
+            }
+            let Some(done) = self.perform(&job, flash) else {
+                return;
+            };
+            let image = other(flash);
+            let after = device.lock(|device| {
+                let update = device.update.as_mut();
+                let after = update.map_or(After::Nothing, |update| update.end(&job, done, image));
+                if after == After::Restart {
+                    device.restart = Some(Restart::Update);
+                }
+                after
+            });
+            if after == After::Confirmed {
+                kept::end_choice();
+            }
+            if erases {
+                self.erased = clock::millis();
+                return;
+            }
+        }
+    }
+
+    /// Performs a step. Returns `None` if it must wait, because the supply is low.
+    fn perform(&mut self, job: &Job, flash: &mut Flash) -> Option<Done> {
+        let done = match job {
+            Job::Write(record) => write(&mut self.journal, flash, *record).map(Done::Written),
+            Job::InSlot(job) => job.perform(&mut flash.other_slot()?, |parts| self.crc.of(parts)),
+        };
+        match done {
+            Ok(done) => Some(done),
+            Err(FlashError::LowSupply) => None,
+            Err(FlashError::Failed) => Some(job.failed()),
+        }
+    }
+}
+
+/// Writes a boot state that is not in force yet. Returns whether it could.
+fn write(journal: &mut Journal, flash: &mut Flash, record: Record) -> Result<bool, FlashError> {
+    if journal.record() == Some(record) {
+        return Ok(true);
+    }
+    match journal.write(&mut BootPages(flash), record) {
+        Ok(()) => Ok(true),
+        Err(JournalError::Worn) => Ok(false),
+        Err(JournalError::Flash(error)) => Err(error),
+    }
+}
+
+/// Describes the image in the slot that does not run.
+fn other(flash: &mut Flash) -> [u16; 8] {
+    flash
+        .other_slot()
+        .map_or([0; 8], |slot| described(slot.bytes()))
+}

@@ -1,0 +1,151 @@
+//! Orders, blocks and state of an update, as requests.
+
+use std::vec;
+
+use loader::Record;
+use register_map::update::{Slot, State as OfSlot};
+
+use super::*;
+use crate::update::TRIAL_S;
+
+static LAYOUT: register_map::layout::Layout = MODIO_02.layout();
+
+const PREPARE: u16 = 0xB001;
+const CONFIRM: u16 = 0xB003;
+const AS_255: u16 = 0xB007;
+const CODES: [u16; 5] = [PREPARE, 0xB002, CONFIRM, 0xB004, AS_255];
+
+/// Returns a unit with an image in this state in slot A, from which it runs.
+fn bench(own: OfSlot, lora: u16) -> Bench {
+    let mut bench = Bench::new(Module::Di4, &[(at::LORA, lora)]);
+    let record = Record {
+        preferred: Slot::A,
+        states: [own, OfSlot::Empty],
+        floor: 0,
+    };
+    let update = Update::new(1, &LAYOUT, Slot::A, Some(record), [[0; 8]; 2], false);
+    bench.device.update = Some(update);
+    bench
+}
+
+/// Performs the next step of the update, which must be a change of the boot state.
+fn write_state(bench: &mut Bench) {
+    use crate::update::{Done, Job};
+    let update = bench.device.update.as_mut().unwrap();
+    let job = update.next().unwrap();
+    assert!(matches!(job, Job::Write(_)));
+    update.end(&job, Done::Written(true), [0; 8]);
+}
+
+#[test]
+fn unit_without_loader_has_neither_the_orders_nor_the_files() {
+    let mut bench = Bench::new(Module::Di4, &[]);
+    for code in CODES {
+        assert_eq!(bench.write(at::COMMAND, &[code]), Err(3), "{code:#x}");
+        bench.unlock();
+        assert_eq!(bench.write(at::COMMAND, &[code]), Err(3), "{code:#x}");
+    }
+    assert_eq!(bench.read(0x022A, 1), Ok(vec![0]));
+}
+
+#[test]
+fn orders_need_the_lock_and_the_units_own_address() {
+    let mut bench = bench(OfSlot::Confirmed, 0);
+    assert_eq!(bench.read(0x022A, 1), Ok(vec![1]));
+    assert_eq!(bench.write(at::COMMAND, &[PREPARE]), Err(6));
+    bench.unlock();
+    let own = Origin::default();
+    bench.device.set_origin(Origin {
+        broadcast: true,
+        ..own
+    });
+    for code in CODES {
+        assert_eq!(bench.write(at::COMMAND, &[code]), Err(6), "{code:#x}");
+    }
+    bench.device.set_origin(own);
+    assert_eq!(bench.write(at::COMMAND, &[0xB002]), Err(6), "no blocks");
+    assert_eq!(bench.write(at::COMMAND, &[0xB004]), Err(6), "no image");
+    assert_eq!(bench.write(at::COMMAND, &[PREPARE]), Ok(()));
+    assert_eq!(bench.write(at::COMMAND, &[PREPARE]), Err(6), "under way");
+    assert_eq!(bench.write(at::COMMAND, &[AS_255]), Ok(()));
+    assert_eq!(bench.device.restart, Some(Restart::As255));
+}
+
+#[test]
+fn preparation_costs_a_save_of_the_budget() {
+    let mut bench = bench(OfSlot::Confirmed, 0);
+    bench.device.config.set_saves_left(1);
+    bench.unlock();
+    assert_eq!(bench.write(at::COMMAND, &[PREPARE]), Ok(()));
+    write_state(&mut bench);
+    assert_eq!(bench.device.config.saves_left(), 0);
+    assert_eq!(bench.write(at::COMMAND, &[PREPARE]), Err(6));
+    bench.device.tick(59_000);
+    bench.unlock();
+    bench.device.tick(1_000);
+    assert_eq!(bench.write(at::COMMAND, &[PREPARE]), Ok(()));
+}
+
+#[test]
+fn preparation_over_the_air_needs_a_radio_with_settings() {
+    for (lora, answer) in [(1, Ok(())), (2, Err(6))] {
+        let mut bench = bench(OfSlot::Confirmed, lora);
+        bench.device.set_origin(Origin {
+            line: LineName::Radio,
+            broadcast: false,
+        });
+        let _ = bench.ask(&[6, 1, 0, 0x5A, 0x17]);
+        assert_eq!(bench.write(at::COMMAND, &[PREPARE]), answer);
+    }
+}
+
+#[test]
+fn image_that_nobody_confirms_restarts_after_15_minutes() {
+    for (own, restarts) in [(OfSlot::Trial(1), true), (OfSlot::Confirmed, false)] {
+        let mut bench = bench(own, 0);
+        bench.device.tick(TRIAL_S * 1000 - 1);
+        assert_eq!(bench.device.restart, None);
+        bench.device.tick(1);
+        assert_eq!(bench.device.restart.is_some(), restarts);
+    }
+    let mut bench = bench(OfSlot::Trial(1), 0);
+    bench.unlock();
+    assert_eq!(bench.write(at::COMMAND, &[CONFIRM]), Ok(()));
+    write_state(&mut bench);
+    bench.device.tick(TRIAL_S * 1000);
+    assert_eq!(bench.device.restart, None);
+}
+
+/// Function 15 with a first block of an image for slot B, and zeros.
+fn block() -> Vec<u8> {
+    let mut request = vec![0x15, 135, 6, 1, 0x80, 0, 0, 0, 64];
+    request.resize(9 + 128, 0);
+    request[9..15].copy_from_slice(b"MODI\x02\x01");
+    request[21..25].copy_from_slice(&LAYOUT.slots[1].to_le_bytes());
+    request[25..29].copy_from_slice(&512_u32.to_le_bytes());
+    request
+}
+
+#[test]
+fn block_keeps_the_lock_open_and_needs_none() {
+    let mut bench = bench(OfSlot::Confirmed, 0);
+    assert_eq!(bench.ask(&block()), [0x95, 6], "not prepared");
+    bench.unlock();
+    assert_eq!(bench.write(at::COMMAND, &[PREPARE]), Ok(()));
+    write_state(&mut bench);
+    while let Some(job) = bench.device.update.as_ref().unwrap().next() {
+        use crate::update::Done;
+        let update = bench.device.update.as_mut().unwrap();
+        update.end(&job, Done::Erased(true), [0; 8]);
+    }
+    bench.device.tick(59_000);
+    assert_eq!(bench.ask(&block()), block());
+    bench.device.tick(59_000);
+    assert_eq!(bench.read(at::KEY, 1), Ok(vec![1]));
+    bench.device.tick(1_000);
+    assert_eq!(bench.read(at::KEY, 1), Ok(vec![0]));
+    assert_eq!(bench.ask(&block()), block());
+    assert_eq!(bench.read(at::KEY, 1), Ok(vec![0]), "it stays closed");
+    let reply = bench.ask(&[0x14, 7, 6, 0, 2, 0, 0, 0, 4]);
+    assert_eq!(reply[4..], [0, 1, 0, 0, 0, 8, 0, 8]);
+}

@@ -1,0 +1,116 @@
+//! What the background task does for an update, one step at a time.
+
+use board_support::pages::Slot;
+use loader::Record;
+use register_map::update::{BLOCK_BYTES, Header, Reason, intact};
+
+/// A block of an image.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Block {
+    pub(super) number: u16,
+    pub(super) bytes: [u8; BLOCK_BYTES],
+}
+
+/// A step.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Job {
+    /// Write this boot state.
+    Write(Record),
+    /// Do this in the slot that does not run.
+    InSlot(InSlot),
+}
+
+/// A step in the slot that does not run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum InSlot {
+    /// Erase this page.
+    Erase(u16),
+    /// Program what differs of this block.
+    Program(Block),
+    /// Check that the image is intact.
+    Check,
+}
+
+/// How a step has ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Done {
+    /// The page is erased, or could not be.
+    Erased(bool),
+    /// The block is in the slot, or does not fit what lies there.
+    Programmed(bool),
+    /// The image is intact, or what is wrong with it.
+    Checked(Result<(), Reason>),
+    /// The boot state is written, or could not be.
+    Written(bool),
+}
+
+impl InSlot {
+    /// Performs the step. `crc` computes a CRC-32.
+    ///
+    /// # Errors
+    ///
+    /// When the flash refuses an operation. The step may be performed again.
+    pub fn perform<S: Slot>(
+        &self,
+        slot: &mut S,
+        crc: impl FnOnce([&[u8]; 2]) -> u32,
+    ) -> Result<Done, S::Error> {
+        match self {
+            Self::Erase(page) => {
+                let page = usize::from(*page);
+                slot.erase(page)?;
+                let size = slot.page_bytes();
+                let bytes = slot.bytes().get(page * size..).unwrap_or_default();
+                let mut bytes = bytes.iter().take(size);
+                Ok(Done::Erased(bytes.all(|byte| *byte == 0xFF)))
+            }
+            Self::Program(block) => program(slot, block).map(Done::Programmed),
+            Self::Check => Ok(Done::Checked(intact(slot.bytes(), crc).map(drop))),
+        }
+    }
+}
+
+impl Job {
+    /// Returns how the step has ended when the flash refuses it for good.
+    #[must_use]
+    pub const fn failed(&self) -> Done {
+        match self {
+            Self::InSlot(InSlot::Erase(_)) => Done::Erased(false),
+            Self::InSlot(InSlot::Program(_)) => Done::Programmed(false),
+            Self::Write(_) | Self::InSlot(InSlot::Check) => Done::Written(false),
+        }
+    }
+}
+
+/// Programs the half-words of a block that differ. Returns false when one does not fit what lies there.
+fn program<S: Slot>(slot: &mut S, block: &Block) -> Result<bool, S::Error> {
+    let first = usize::from(block.number) * BLOCK_BYTES;
+    let halves = block.bytes.as_chunks().0.iter();
+    for (offset, bytes) in (first..).step_by(2).zip(halves) {
+        let half = u16::from_le_bytes(*bytes);
+        let there = read(slot, offset);
+        // Over a programmed half-word only 0 can be programmed (PM0075 2.3.3).
+        if there == half {
+            continue;
+        }
+        if there != 0xFFFF && half != 0 {
+            return Ok(false);
+        }
+        slot.program(offset, half)?;
+        if read(slot, offset) != half {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+fn read(slot: &impl Slot, offset: usize) -> u16 {
+    let bytes = slot.bytes().get(offset..).unwrap_or_default();
+    u16::from_le_bytes(bytes.first_chunk().copied().unwrap_or_default())
+}
+
+/// Returns what file 2 reports of the image in a slot, zero without one.
+#[must_use]
+pub fn described(slot: &[u8]) -> [u16; 8] {
+    Header::of(slot).map_or([0; 8], |header| header.words())
+}

@@ -1,0 +1,131 @@
+//! Boards with the loader, and signed images in their slots.
+
+use std::{fs, sync::LazyLock};
+
+use ed25519_dalek::{Signer as _, SigningKey};
+use register_map::configuration::MODULE;
+use register_map::update::crc32;
+use sha2::{Digest as _, Sha512};
+use sim::{Config, Image, Time, chip};
+
+use crate::{
+    LAYOUT,
+    bench::{Bench, PAGE_SIZE, PORT, flash_with_settings, pages, path},
+};
+
+/// Offset of the application in an image, and of fields in the header.
+pub const APPLICATION: usize = 512;
+pub const LENGTH: usize = 16;
+pub const CRC: usize = 20;
+pub const HASH: usize = 28;
+pub const SIGNATURE: usize = 92;
+pub const KEY: usize = 156;
+const RAM: u32 = 0x2000_0000;
+
+/// Time from power-on to the first answer, when the loader checks no signature.
+pub const START: Time = Time::from_ms(400);
+/// The longest check of an image, at the slow corner.
+pub const CHECK: Time = Time::from_ms(4_000);
+
+/// The loader, and the images for slots A and B.
+static BUILT: LazyLock<(Image, [Vec<u8>; 2])> = LazyLock::new(|| {
+    let image = |name| fs::read(path(name)).expect("the image can be read");
+    (
+        Image::read(&path("MODIO_LOADER")).expect("the loader can be read"),
+        [image("MODIO_A"), image("MODIO_B")],
+    )
+});
+
+/// Returns the image for a slot, 0 or 1.
+pub fn image(slot: usize) -> Vec<u8> {
+    BUILT.1[slot].clone()
+}
+
+/// Returns the image for a slot with changes, and with the hash and the signature that belong to it.
+pub fn signed(slot: usize, change: impl FnOnce(&mut [u8])) -> Vec<u8> {
+    let mut image = image(slot);
+    change(&mut image);
+    let hash = Sha512::digest(&image[APPLICATION..]);
+    image[HASH..HASH + 64].copy_from_slice(&hash);
+    sign(&mut image);
+    image
+}
+
+/// Gives an image the CRC-32 and the signature of the development key that belong to its header.
+pub fn sign(image: &mut [u8]) {
+    with_crc(image);
+    let digits = include_str!("../../../../loader/keys/development.key").trim();
+    let key = core::array::from_fn(|n| u8::from_str_radix(&digits[2 * n..][..2], 16).unwrap());
+    let signature = SigningKey::from_bytes(&key).sign(&image[..SIGNATURE]);
+    image[SIGNATURE..SIGNATURE + 64].copy_from_slice(&signature.to_bytes());
+}
+
+/// Gives an image the CRC-32 that belongs to it.
+pub fn with_crc(image: &mut [u8]) {
+    let crc = crc32([&image[..CRC], &image[APPLICATION..]]);
+    image[CRC..CRC + 4].copy_from_slice(&crc.to_le_bytes());
+}
+
+/// Returns a board just powered on, with these images in its slots, and one module and these settings in its
+/// configuration.
+pub fn unit(slots: [&[u8]; 2], settings: &[(u16, u16)]) -> Bench {
+    let layout = LAYOUT.board.layout();
+    let offset = |address: u32| (address - 0x0800_0000) as usize;
+    let module = [(MODULE + PORT - 1, 1)];
+    let mut flash = flash_with_settings(&[&module, settings].concat());
+    let [stored, _] = pages();
+    let page = flash[stored.clone()].to_vec();
+    flash[stored].fill(0xFF);
+    let store = offset(layout.store.first);
+    flash[store..store + PAGE_SIZE].copy_from_slice(&page);
+    for (address, image) in layout.slots.into_iter().zip(slots) {
+        let at = offset(address);
+        flash[at..at + image.len()].copy_from_slice(image);
+    }
+    holding(flash, 1)
+}
+
+/// Returns a board just powered on, with these bytes in its flash and this switch.
+pub fn holding(flash: Vec<u8>, dip: u8) -> Bench {
+    let config = Config {
+        dip,
+        chip: chip::Config::holding(flash),
+        ..Config::default()
+    };
+    let mut bench = Bench::of(&BUILT.0, config);
+    // The loader's reset after a check.
+    bench.tolerant = true;
+    bench
+}
+
+/// Runs until the unit answers, and returns that time.
+pub fn answers(bench: &mut Bench, within: Time) -> Option<Time> {
+    answers_as(bench, 1, within)
+}
+
+/// Runs until the unit answers with this address, and returns that time.
+pub fn answers_as(bench: &mut Bench, unit: u8, within: Time) -> Option<Time> {
+    let end = bench.board.now() + within;
+    while bench.board.now() < end {
+        bench.board.run_for(Time::from_ms(20));
+        if bench.ask(unit, &[3, 2, 5, 0, 1]).is_some() {
+            let module = bench.ask(unit, &[3, 2, 0x0F + PORT as u8, 0, 1]);
+            assert_eq!(module.as_deref(), Some(&[3, 2, 0, 1][..]), "it is stored");
+            assert_eq!(bench.board.findings(), []);
+            return Some(bench.board.now());
+        }
+    }
+    None
+}
+
+/// Returns the slot whose code runs.
+pub fn runs_from(bench: &mut Bench) -> usize {
+    let [a, b] = LAYOUT.board.layout().slots;
+    // A handler may run in RAM.
+    while bench.board.pc() >= RAM {
+        bench.board.run_for(Time::from_us(1));
+    }
+    let pc = bench.board.pc();
+    assert!(pc >= a, "the loader runs");
+    usize::from(pc >= b)
+}
