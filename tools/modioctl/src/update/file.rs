@@ -142,31 +142,17 @@ fn image(bytes: &[u8], slot: Slot) -> Result<(&'static Board, Image), String> {
             header.address()
         ))
     })?;
-    if bytes.len() > layout.slot as usize {
-        return Err(wrong(&format!("is longer than a slot of the {board}")));
-    }
-    intact(bytes, crc32).map_err(|_| wrong("has a wrong length or CRC-32"))?;
+    header
+        .blocks(layout.slot as usize)
+        .map_err(|_| wrong(&format!("does not fit a slot of the {board}")))?;
+    intact(bytes, crc32).map_err(|_| wrong("is cut short, or its CRC-32 is wrong"))?;
     let blocks = bytes.chunks(BLOCK_BYTES).map(|chunk| {
         let mut block = [0xFF; BLOCK_BYTES];
         block[..chunk.len()].copy_from_slice(chunk);
         block
     });
     let blocks: Vec<_> = blocks.collect();
-    let ([major, minor], patch) = header.version();
-    let high_low = |number: u32| [(number >> 16) as u16, number as u16];
-    let ([commit, ommit], [key, ey]) = (high_low(header.commit()), high_low(header.key()));
-    let version = u16::from_be_bytes([major, minor]);
-    let count = blocks.len() as u16;
-    let words = [
-        version,
-        patch,
-        header.epoch(),
-        commit,
-        ommit,
-        count,
-        key,
-        ey,
-    ];
+    let words = header.words();
     Ok((
         board,
         Image {
@@ -266,7 +252,7 @@ pub(crate) mod tests {
         unsealed[600] ^= 1;
         assert!(refused(&file([a.clone(), unsealed])).contains("CRC-32"));
         let long = image(Slot::B, 54 * 1024);
-        assert!(refused(&file([a, long])).contains("longer than a slot"));
+        assert!(refused(&file([a, long])).contains("does not fit a slot"));
     }
 
     #[test]
