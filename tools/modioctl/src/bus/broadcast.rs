@@ -17,10 +17,10 @@ const STEP: Duration = Duration::from_millis(1);
 const NOISE: usize = 4;
 
 impl Master {
-    /// Sends a request to all units as soon as the line is free, without the delay of a timer: a millisecond is a
-    /// tenth of a block at 115200 bit/s.
-    pub async fn broadcast(&mut self, pdu: &[u8]) -> io::Result<()> {
-        let free = self.free();
+    /// Sends a request to all units once the line has been free for this pause, without the delay of a timer: a
+    /// millisecond is a tenth of a block at 115200 bit/s.
+    pub async fn broadcast(&mut self, pdu: &[u8], pause: Duration) -> io::Result<()> {
+        let free = self.free() + pause;
         self.free_from(free - STEP);
         self.settle(ALL, pdu).await?;
         std::thread::sleep(free.saturating_duration_since(Instant::now()));

@@ -182,7 +182,7 @@ impl Master {
     }
 
     /// Returns the time from which the next frame may be sent.
-    pub(super) const fn free(&self) -> Instant {
+    pub const fn free(&self) -> Instant {
         self.free
     }
 

@@ -20,8 +20,15 @@ use super::{Stage, Unit};
 const FIRST_TIMES: usize = 3;
 /// Time in which a unit programs a block. Two are staged, so blocks are sent no faster than this on average.
 const PROGRAMMING: Duration = Duration::from_millis(5);
-/// Additional time between blocks once a unit has missed many.
-const SLOWER: Duration = Duration::from_millis(15);
+/// First pause between blocks, in addition to the silence between frames.
+const PAUSE: Duration = Duration::from_micros(250);
+/// What the pause grows by each time that a unit misses many blocks. Adapters, gateways and busy computers may join
+/// blocks that follow each other closely.
+const SLOWER: Duration = Duration::from_millis(1);
+/// The longest pause.
+const SLOWEST: Duration = Duration::from_millis(40);
+/// Blocks after which a unit is asked how many have arrived, if it was missing most of them.
+const FIRST_BLOCKS: usize = 32;
 /// Time until both staged blocks are programmed, and a unit reports what it is missing.
 const STAGED: Duration = Duration::from_millis(10);
 /// Time in which a unit erases a page.
@@ -58,10 +65,12 @@ pub enum Step {
         pdu: Vec<u8>,
         /// Least time from the beginning of one block to that of the next.
         apart: Duration,
+        /// How long the line must be idle before it, in addition to the silence between frames.
+        pause: Duration,
     },
     /// Send this to all units, and pass anything that is received to [`Campaign::heard`]: nothing should be.
     Probe(Vec<u8>),
-    /// Wait.
+    /// Leave the line idle for this time.
     Wait(Duration),
 }
 
@@ -75,6 +84,8 @@ enum Action {
     Unlock(usize, Command),
     Order(usize, Command),
     Status(usize),
+    /// Asks how many have arrived of this number of blocks that the unit was missing.
+    Early(usize, usize),
     Short(usize),
     Bits(usize),
     Identity(usize),
@@ -90,6 +101,7 @@ impl Action {
             | Self::Unlock(unit, _)
             | Self::Order(unit, _)
             | Self::Status(unit)
+            | Self::Early(unit, _)
             | Self::Short(unit)
             | Self::Bits(unit)
             | Self::Identity(unit)
@@ -114,7 +126,8 @@ pub struct Campaign {
     is_probed: bool,
     /// The header was sent, so what units report of their blocks is about this image.
     is_begun: bool,
-    apart: Duration,
+    /// Pause between blocks.
+    pause: Duration,
     sent: usize,
 }
 
@@ -131,7 +144,7 @@ impl Campaign {
             unicast,
             is_probed: false,
             is_begun: blocks.is_empty(),
-            apart: PROGRAMMING,
+            pause: PAUSE,
             sent: 0,
         }
     }
@@ -172,22 +185,27 @@ impl Campaign {
             Action::Wait(time) => return Some(Step::Wait(time)),
             Action::Probe => return Some(Step::Probe(messages::harmless())),
             Action::Broadcast(number) => {
-                let (pdu, apart) = (block(number)?, self.apart);
-                return Some(Step::Broadcast { pdu, apart });
+                return Some(Step::Broadcast {
+                    pdu: block(number)?,
+                    apart: PROGRAMMING,
+                    pause: self.pause,
+                });
             }
             Action::Block(_, number) => block(number)?,
             Action::Unlock(..) => messages::unlock(),
             Action::Order(_, command) => messages::order(command.code()),
             Action::Status(_) => messages::read_status(),
-            Action::Short(_) => messages::read_short(),
+            Action::Early(..) | Action::Short(_) => messages::read_short(),
             Action::Bits(_) => messages::read_bits(self.blocks.len()),
             Action::Identity(_) => messages::read_identity(),
             Action::Confirmed(_) => messages::read_register(),
         };
         let unit = self.units.get(action.unit()?)?;
-        let patience = match unit.stage {
-            Stage::Receiving if !self.unicast && !unit.is_silent() => Patience::Little,
-            Stage::Restarting => Patience::Little,
+        let patience = match (unit.stage, action) {
+            // A gateway that has stored blocks delivers the question late.
+            (_, Action::Early(..)) => Patience::Usual,
+            (Stage::Receiving, _) if !self.unicast && !unit.is_silent() => Patience::Little,
+            (Stage::Restarting, _) => Patience::Little,
             _ => Patience::Usual,
         };
         let unit = unit.address;
@@ -282,14 +300,25 @@ impl Campaign {
             let blocks: Vec<_> = blocks.collect();
             self.queue.extend(blocks);
         } else if self.is_probed {
-            let first = receiving().map(|(index, _)| index).next();
+            // How many of the first blocks one of the units is missing.
+            let early = union.get(..FIRST_BLOCKS).unwrap_or_default();
+            let counted = receiving().map(|(index, unit)| {
+                let missing = early
+                    .iter()
+                    .filter(|block| unit.missing.get(**block) == Some(&true));
+                (missing.count(), index)
+            });
+            let check = counted.max().filter(|(count, _)| 2 * count > FIRST_BLOCKS);
             if let [0, ..] = union[..] {
-                self.queue.extend([Action::Broadcast(0); FIRST_TIMES]);
-                // Shows early whether broadcasts arrive at all.
-                self.queue.extend(first.map(Action::Short));
-                union.remove(0);
+                self.queue.extend([Action::Broadcast(0); FIRST_TIMES - 1]);
             }
-            self.queue.extend(union.into_iter().map(Action::Broadcast));
+            for (n, block) in union.into_iter().enumerate() {
+                if let Some((count, unit)) = check.filter(|_| n == FIRST_BLOCKS) {
+                    let check = [Action::Wait(STAGED), Action::Early(unit, count)];
+                    self.queue.extend(check);
+                }
+                self.queue.push_back(Action::Broadcast(block));
+            }
         } else {
             return self.probe();
         }

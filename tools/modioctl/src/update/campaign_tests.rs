@@ -1,8 +1,9 @@
 use register_map::update::{Reason, Slot, State};
 
+use super::bus::Bus;
 use super::file::File;
 use super::file::tests::of_blocks;
-use super::model::{Bus, Flaw};
+use super::model::Flaw;
 use super::{Campaign, Fault, Stage, Unit};
 
 /// Blocks of the image: 45 KiB, the largest that a modio-02 has.
@@ -69,6 +70,7 @@ fn bit_errors_cost_what_is_missing_anywhere() {
                 bus.ratio(BLOCKS)
             });
             let ratio = ratios.sum::<f64>() / RUNS as f64;
+            println!("{errors:?} {baud} {ratio}");
             assert!(ratio <= most, "{errors:?} at {baud} bit/s: {ratio:.3}");
         }
     }
@@ -94,6 +96,16 @@ fn a_fast_line_is_slowed_down_to_the_speed_of_the_flash() {
 }
 
 #[test]
+fn blocks_that_an_adapter_joins_are_sent_with_a_longer_pause() {
+    let mut bus = Bus::new(115_200, 2);
+    bus.joins = std::time::Duration::from_millis(10);
+    let campaign = update(&mut bus, false);
+    assert_eq!(stages(&campaign), [Stage::Done; 2]);
+    let (sent, _) = campaign.blocks();
+    assert!(sent < BLOCKS + 120, "{sent}");
+}
+
+#[test]
 fn blocks_are_sent_to_each_unit_alone_when_something_answers_broadcasts_or_they_do_not_arrive() {
     let mut answers = Bus::new(115_200, 3);
     answers.units[1].flaw = Flaw::AnswersBroadcasts;
@@ -104,7 +116,7 @@ fn blocks_are_sent_to_each_unit_alone_when_something_answers_broadcasts_or_they_
         assert!(campaign.is_unicast());
         assert_eq!(stages(&campaign), [Stage::Done; 3]);
         let (sent, _) = campaign.blocks();
-        assert!(sent <= 3 * BLOCKS + 3, "{sent}");
+        assert!(sent < 3 * BLOCKS + 40, "{sent}");
     }
 }
 

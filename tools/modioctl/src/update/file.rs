@@ -165,47 +165,8 @@ fn image(bytes: &[u8], slot: Slot) -> Result<(&'static Board, Image), String> {
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use register_map::board::MODIO_02;
-
+    use super::super::sample::{file, image, sealed};
     use super::*;
-
-    /// Returns an image for a slot of a modio-02, with this number of bytes of application.
-    fn image(slot: Slot, length: usize) -> Vec<u8> {
-        let mut image = vec![0; 512];
-        image[..8].copy_from_slice(b"MODI\x02\x01\0\0");
-        image[8..12].copy_from_slice(&[0, 3, 1, 0]);
-        let address = MODIO_02.layout().slots[slot as usize];
-        image[12..16].copy_from_slice(&address.to_le_bytes());
-        image[16..20].copy_from_slice(&(length as u32).to_le_bytes());
-        image[24..28].copy_from_slice(&0x1A2B_3C4D_u32.to_le_bytes());
-        image.extend((0..length).map(|n| (n * n / 7) as u8));
-        sealed(image)
-    }
-
-    /// Returns the image with its CRC-32.
-    fn sealed(mut image: Vec<u8>) -> Vec<u8> {
-        let crc = crc32([&image[..20], &image[512..]]);
-        image[20..24].copy_from_slice(&crc.to_le_bytes());
-        image
-    }
-
-    /// Returns the bytes of a file with these images.
-    fn file(images: [Vec<u8>; 2]) -> Vec<u8> {
-        let mut file = Vec::new();
-        let mut manifest = MAGIC.to_vec();
-        for image in images {
-            manifest.extend((file.len() as u32).to_le_bytes());
-            manifest.extend((image.len() as u32).to_le_bytes());
-            file.extend(image);
-            file.resize(file.len().next_multiple_of(BLOCK_BYTES), 0xFF);
-        }
-        manifest.extend(Sha512::digest(&file));
-        manifest.resize(CRC, 0);
-        let crc = crc32([&manifest, &[]]);
-        manifest.extend(crc.to_le_bytes());
-        file.extend(manifest);
-        file
-    }
 
     /// Returns the file of a modio-02 whose images have this number of blocks.
     pub fn of_blocks(blocks: usize) -> File {

@@ -11,9 +11,13 @@ mod messages;
 mod unit;
 
 #[cfg(test)]
+mod bus;
+#[cfg(test)]
 mod campaign_tests;
 #[cfg(test)]
 mod model;
+#[cfg(test)]
+mod sample;
 
 pub use campaign::{Campaign, Patience, Step};
 pub use fault::{Fault, said};

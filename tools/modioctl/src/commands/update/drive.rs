@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use chrono::Local;
-use tokio::time::{Instant, sleep, sleep_until};
+use tokio::time::{Instant, sleep_until};
 
 use super::progress::Progress;
 use crate::bus::{Lost, is_from_gateway};
@@ -81,7 +81,9 @@ impl Drive<'_> {
             let started = Instant::now();
             let answer = match step {
                 Step::Wait(time) => {
-                    sleep(time).await;
+                    // The last block may still be on its way.
+                    let free = self.device.master.free().max(Instant::now());
+                    sleep_until(free + time).await;
                     None
                 }
                 Step::Probe(pdu) => {
@@ -89,10 +91,10 @@ impl Drive<'_> {
                     let answers = answers.map_err(|error| self.broken(error))?;
                     answers.then_some(pdu)
                 }
-                Step::Broadcast { pdu, apart } => {
+                Step::Broadcast { pdu, apart, pause } => {
                     sleep_until(block + apart).await;
                     block = Instant::now();
-                    let sent = self.device.master.broadcast(&pdu).await;
+                    let sent = self.device.master.broadcast(&pdu, pause).await;
                     sent.map_err(|error| self.broken(error))?;
                     None
                 }

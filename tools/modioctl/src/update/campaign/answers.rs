@@ -2,7 +2,7 @@
 
 use register_map::codes::Command;
 
-use super::{Action, Campaign, FEW, PROGRAMMING, SLOWER};
+use super::{Action, Campaign, PROGRAMMING, SLOWER, SLOWEST};
 use crate::update::messages;
 use crate::update::{Fault, Stage, Status};
 
@@ -115,12 +115,13 @@ impl Campaign {
                 Stage::Erasing => unit.erases(&status),
                 _ => unit.restarts(&status),
             },
-            // After the first block, in front of all others.
-            (Action::Short(_), Some(status))
-                if self.queue.front().is_some_and(|next| next.is_block()) =>
-            {
+            (Action::Early(_, sent), Some(status)) => {
+                let before = unit.lacks();
                 if status.blocks == 0 && status.reason == 0 {
                     self.send_to_each();
+                } else if usize::from(status.missing) + sent > before + sent / 4 {
+                    self.pause = (2 * self.pause + SLOWER).min(SLOWEST);
+                    self.queue.clear();
                 }
             }
             (Action::Short(_), Some(status)) => {
@@ -129,12 +130,9 @@ impl Campaign {
                 }
             }
             (Action::Bits(_), _) => {
-                let before = unit.lacks();
                 if !unit.lists(&words) {
                     unit.poll(u8::MAX, Fault::Strange);
                     self.queue.push_front(Action::Short(index));
-                } else if self.is_begun && before > FEW && unit.lacks() > before / 2 {
-                    self.apart = PROGRAMMING + SLOWER;
                 }
             }
             (Action::Identity(_), _) => {
