@@ -11,7 +11,7 @@ use super::{Campaign, Patience, Step};
 /// Time for which the master waits for an answer as usual, three times.
 const USUAL: Duration = Duration::from_secs(1);
 /// What it adds to the time of the longest answer with little patience.
-const LITTLE: Duration = Duration::from_millis(50);
+const LITTLE: Duration = Duration::from_millis(100);
 
 /// A line with units.
 pub struct Bus {

@@ -162,7 +162,14 @@ impl Drive<'_> {
         self.progress.pause(|| match values {
             Ok(values) => print(Local::now(), &poll.items, &values, &poll.form),
             Err(failure) => {
-                eprintln!("modioctl: poll: {failure}");
+                let unit = self.device.unit;
+                match failure {
+                    Failure::NoAnswer(_) => {
+                        eprintln!("modioctl: poll: unit {unit} does not answer")
+                    }
+                    Failure::Garbled(_) => eprintln!("modioctl: poll: garbled answer"),
+                    failure => eprintln!("modioctl: poll: {failure}"),
+                }
                 Ok(())
             }
         })

@@ -23,7 +23,7 @@ use progress::Progress;
 use report::{Transfer, report, show};
 
 /// What is added to the time of the longest answer until a unit counts as silent for now.
-const MARGIN: Duration = Duration::from_millis(50);
+const MARGIN: Duration = Duration::from_millis(100);
 
 /// Updates units, or shows what they run.
 pub async fn run(
