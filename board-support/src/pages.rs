@@ -22,6 +22,21 @@ impl Page {
     }
 }
 
+/// Why something could not be written to pages. What was there before is still in force.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WriteError<E> {
+    /// The flash refused an operation or failed. The page may be worn out.
+    Flash(E),
+    /// The flash does not read back as programmed: the page is worn out.
+    Worn,
+}
+
+impl<E> From<E> for WriteError<E> {
+    fn from(error: E) -> Self {
+        Self::Flash(error)
+    }
+}
+
 /// Two pages of a flash that is programmed by half-words and erased by pages (RM0008 3.3).
 ///
 /// An operation that is interrupted may leave any content in its half-word or page, and does not change anything

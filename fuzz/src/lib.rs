@@ -6,6 +6,7 @@
 //! | `receiver_rtu`, `receiver_ascii` | characters, faults, silences, buffers in use by requests | [`modbus_reference::Receiver`] |
 //! | `pdu` | requests of any content to one server, and their replies | [`modbus_reference::Server`] |
 //! | `store` | flash pages of any content, saves, starts, power cuts, wear | [`pages`]; a start finds what was saved last |
+//! | `update` | a slot with any content; pages of the boot state with any content, changes, starts, power cuts | the header read in another way; a start finds what was written last |
 //! | `description` | a document with any content | none: its own limits, and the same after encoding and decoding |
 //!
 //! Every target accepts any bytes. `examples/seeds` writes the seeds in `corpus/`.
@@ -25,6 +26,7 @@ pub mod receiver;
 mod running;
 pub mod script;
 pub mod store;
+pub mod update;
 
 /// Bytes of a page of the store.
 const PAGE_SIZE: usize = register_map::board::MODIO_02.store.bytes as usize;

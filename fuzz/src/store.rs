@@ -14,7 +14,7 @@
 //! ```
 
 use firmware::config::Settings;
-use firmware::store::{Loaded, Page, Store, StoreError};
+use firmware::store::{Loaded, Page, Store, WriteError};
 use register_map::board::MODIO_02;
 
 use crate::PAGE_SIZE;
@@ -150,7 +150,7 @@ impl Life {
     }
 
     /// Handles the result of an operation: a power cut stops the device, and a worn flash may refuse.
-    fn handle<T>(&mut self, result: Option<Result<T, StoreError<Fault>>>) {
+    fn handle<T>(&mut self, result: Option<Result<T, WriteError<Fault>>>) {
         if matches!(result, Some(Err(_))) && pages::nothing_good(&self.flash.pages) {
             // The defaults that the first start stores are missing, because the start was interrupted or the flash
             // is worn. Only the remains of an erase or a save exist.
@@ -158,11 +158,11 @@ impl Life {
         }
         match result {
             None | Some(Ok(_)) => {}
-            Some(Err(StoreError::Flash(Fault::PowerCut))) => self.power_cycle(),
+            Some(Err(WriteError::Flash(Fault::PowerCut))) => self.power_cycle(),
             // The flash only refuses a half-word whose programming was interrupted. The stored configuration
             // remains.
-            Some(Err(StoreError::Flash(Fault::NotErased))) => self.refusals += 1,
-            Some(Err(StoreError::Worn)) => assert!(self.flash.worn.is_some(), "not worn"),
+            Some(Err(WriteError::Flash(Fault::NotErased))) => self.refusals += 1,
+            Some(Err(WriteError::Worn)) => assert!(self.flash.worn.is_some(), "not worn"),
         }
     }
 
@@ -215,7 +215,8 @@ impl Life {
     }
 }
 
-fn mess(script: &mut Script<'_>) -> Mess {
+/// Returns what a power cut leaves of the operation.
+pub(crate) fn mess(script: &mut Script<'_>) -> Mess {
     let kind = script.byte();
     let operand = script.half();
     let place = usize::from(operand) % (PAGE_SIZE + 1);

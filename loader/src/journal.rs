@@ -16,7 +16,7 @@
 //! whose programming was cut may read differently from start to start; [`Journal::settle`] ends that before anything is
 //! decided.
 
-use board_support::pages::{Page, Pages};
+use board_support::pages::{Page, Pages, WriteError};
 use register_map::update::{Slot, State, crc32};
 
 use crate::Record;
@@ -28,21 +28,6 @@ const UNSEALED: usize = HALVES - 2;
 const BYTES: usize = 2 * HALVES;
 /// Version of the layout.
 const LAYOUT: u16 = 0x4201;
-
-/// Error of a change of the boot state. The state before is in force, or the new one if only the second seal failed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum JournalError<E> {
-    /// The flash refused an operation.
-    Flash(E),
-    /// The flash does not read back as programmed.
-    Worn,
-}
-
-impl<E> From<E> for JournalError<E> {
-    fn from(error: E) -> Self {
-        Self::Flash(error)
-    }
-}
 
 /// A record in flash.
 #[derive(Clone, Copy, Debug)]
@@ -134,7 +119,7 @@ impl Journal {
     /// # Errors
     ///
     /// When the flash refuses. The state is used as it was read.
-    pub fn settle<F: Pages>(&mut self, flash: &mut F) -> Result<(), JournalError<F::Error>> {
+    pub fn settle<F: Pages>(&mut self, flash: &mut F) -> Result<(), WriteError<F::Error>> {
         match &mut self.newest {
             Some(found) if found.number != self.number => {
                 let record = found.record;
@@ -153,12 +138,12 @@ impl Journal {
     ///
     /// # Errors
     ///
-    /// When the flash fails in both pages; [`JournalError`] says which state is in force.
+    /// When the flash fails in both pages; [`WriteError`] says which state is in force.
     pub fn write<F: Pages>(
         &mut self,
         flash: &mut F,
         record: Record,
-    ) -> Result<(), JournalError<F::Error>> {
+    ) -> Result<(), WriteError<F::Error>> {
         if let Some((page, offset)) = self.free.take()
             && self.append(flash, record, page, offset).is_ok()
         {
@@ -175,7 +160,7 @@ impl Journal {
         record: Record,
         page: Page,
         offset: usize,
-    ) -> Result<(), JournalError<F::Error>> {
+    ) -> Result<(), WriteError<F::Error>> {
         // Each attempt has another number, because its remains may read as a record later.
         self.number += 1;
         let halves = encoded(self.number, record);
@@ -184,7 +169,7 @@ impl Journal {
         }
         let bytes = flash.page(page).get(offset..offset + 2 * UNSEALED);
         if bytes != Some(halves.map(u16::to_le_bytes).as_flattened()) {
-            return Err(JournalError::Worn);
+            return Err(WriteError::Worn);
         }
         seal(flash, page, offset)?;
         self.newest = Some(Found {
@@ -201,7 +186,7 @@ impl Journal {
     }
 }
 
-fn seal<F: Pages>(flash: &mut F, page: Page, offset: usize) -> Result<(), JournalError<F::Error>> {
+fn seal<F: Pages>(flash: &mut F, page: Page, offset: usize) -> Result<(), WriteError<F::Error>> {
     for n in UNSEALED..HALVES {
         flash.program(page, offset + 2 * n, 0)?;
     }
@@ -209,7 +194,7 @@ fn seal<F: Pages>(flash: &mut F, page: Page, offset: usize) -> Result<(), Journa
     if seals == Some(&[0; 4]) {
         Ok(())
     } else {
-        Err(JournalError::Worn)
+        Err(WriteError::Worn)
     }
 }
 

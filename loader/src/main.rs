@@ -15,14 +15,16 @@ use board_support::{
     flash::slot_address,
     kept,
     loading::{Loading, slot_bytes},
-    pac, restart,
+    pac,
+    pages::WriteError,
+    restart,
 };
 use cortex_m_rt::{entry, exception};
 use loader::{
     Record,
     decide::{Next, Part, Start, Unwritten, decide},
     genuine,
-    journal::{Journal, JournalError},
+    journal::Journal,
 };
 use register_map::{
     Board,
@@ -78,7 +80,7 @@ impl Part for Unit {
             let pages = &mut self.loading.boot_pages();
             match self.journal.write(pages, record) {
                 // The supply has fallen since.
-                Err(JournalError::Flash(FlashError::LowSupply)) => {}
+                Err(WriteError::Flash(FlashError::LowSupply)) => {}
                 written => return written.map_err(|_| Unwritten),
             }
         }

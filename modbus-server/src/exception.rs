@@ -37,19 +37,6 @@ impl Exception {
     pub const fn code(self) -> u8 {
         self as u8
     }
-
-    /// Returns the result that is first in the order of checks: address 02, value 03, then state, 04 and above. That is
-    /// the order of the codes.
-    ///
-    /// # Errors
-    /// The first exception of both.
-    pub fn first_of(one: Result<(), Self>, other: Result<(), Self>) -> Result<(), Self> {
-        match (one, other) {
-            (Err(one), Err(other)) if other.code() < one.code() => Err(other),
-            (Ok(()), other) => other,
-            (one, _) => one,
-        }
-    }
 }
 
 impl fmt::Display for Exception {
@@ -71,6 +58,19 @@ impl fmt::Display for Exception {
 }
 
 impl Error for Exception {}
+
+/// Returns the exception that is first in the order of checks: address 02, value 03, then state, 04 and above. That
+/// is the order of the codes.
+pub(crate) fn first_of(
+    one: Result<(), Exception>,
+    other: Result<(), Exception>,
+) -> Result<(), Exception> {
+    match (one, other) {
+        (Err(one), Err(other)) if other.code() < one.code() => Err(other),
+        (Ok(()), other) => other,
+        (one, _) => one,
+    }
+}
 
 #[cfg(test)]
 mod tests {

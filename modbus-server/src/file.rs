@@ -17,6 +17,7 @@
 
 use core::ops::RangeInclusive;
 
+use crate::exception::first_of;
 use crate::{Adu, DataModel, Exception, Span, Words, WordsOut};
 
 /// The only reference type.
@@ -135,7 +136,7 @@ pub(crate) fn check(
                 model.check_read_file(group.file, records)
             }
         });
-        result = Exception::first_of(result, checked);
+        result = first_of(result, checked);
     }
     result.map(|()| reply)
 }

@@ -7,11 +7,13 @@
 use std::process::Command;
 
 use anyhow::{Context as _, Result, ensure};
+use fs_err as fs;
 use register_map::Board;
-use serde_json::Value;
+use register_map::layout::HEADER;
+use serde_json::{Value, json};
 
 use crate::workspace::{self, Workspace};
-use crate::{build, command, image, peers, size};
+use crate::{build, command, image, peers, signed, size};
 
 mod figures;
 #[cfg(test)]
@@ -64,18 +66,25 @@ pub fn check(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
     run(workspace, &Options { build, json, bless })
 }
 
-fn measure(workspace: &mut Workspace, board: &Board) -> Result<Value> {
+fn measure(workspace: &mut Workspace, board: &'static Board) -> Result<Value> {
+    let loader = build::loader(workspace, board)?;
+    let slots = signed::images(workspace, &signed::Options::of(board))?;
     let elf = build::image(workspace, board)?;
     let mut build = rivals(workspace, "build")?;
     let rivals = workspace::artifacts(build.arg("--quiet"))?;
     let mut program = Command::new(workspace.program("modio-bench")?);
-    program.arg(&elf).args(["--board", board.name, "--rivals"]);
+    program.arg(&elf).args(["--board", board.name, "--loader"]);
+    program.arg(&loader).arg("--signed").arg(&slots[0]);
+    program.arg("--rivals");
     for name in RIVALS {
         program.arg(workspace::executable(&rivals, name)?);
     }
     let report = serde_json::from_str(&command::read(&mut program)?);
     let mut report: Value = report.context("the report of tools/bench is broken")?;
     report["image"] = size::report(&elf)?;
+    report["loader"] = size::report(&loader)?;
+    let application = fs::metadata(&slots[0])?.len() - u64::from(HEADER);
+    report["slot"] = json!({ "flash": application, "budget": board.memory().budget[0] });
     server::add(&mut report, &image::parse(&image::read(&elf)?)?)?;
     Ok(report)
 }

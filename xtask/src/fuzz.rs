@@ -26,7 +26,7 @@ const OPTIONS: &str =
 #[derive(clap::Args, Clone, Debug)]
 #[group(skip)]
 pub struct Options {
-    /// Only this target: receiver_rtu, receiver_ascii, pdu, store or description
+    /// Only this target: receiver_rtu, receiver_ascii, pdu, store, update or description
     target: Option<String>,
 
     /// Time for each target, in seconds

@@ -7,7 +7,7 @@ use board_support::{Flash, flash::FlashError, kept};
 use firmware::{
     config::Settings,
     device::Restart,
-    store::{Operation, Saving, Store, StoreError},
+    store::{Operation, Saving, Store, WriteError},
 };
 use rtic::Mutex;
 
@@ -74,7 +74,7 @@ impl Persistence {
         self.erase = false;
         // After a failure of the flash, the next save that needs the page erases it. After a low supply, this
         // function tries again.
-        if let Err(StoreError::Flash(FlashError::LowSupply)) =
+        if let Err(WriteError::Flash(FlashError::LowSupply)) =
             self.store.make_spare(&mut self.pages)
         {
             self.erase = true;
@@ -111,7 +111,7 @@ impl Persistence {
         while let Some(operation) = self.refused.take().or_else(|| saving.next(&settings)) {
             match operation.perform(&mut self.pages) {
                 Ok(()) => {}
-                Err(StoreError::Flash(FlashError::LowSupply)) => {
+                Err(WriteError::Flash(FlashError::LowSupply)) => {
                     self.refused = Some(operation);
                     return self.wait(saving);
                 }

@@ -12,7 +12,7 @@ use firmware::{
     device::Identity,
     leds::{Leds, Trouble},
     start_up::{self, Address, RECOVERY_UNIT},
-    store::{Store, StoreError},
+    store::{Store, WriteError},
 };
 use modbus_server::{
     Adu,
@@ -133,7 +133,7 @@ pub fn up(
     let prepared = store.prepare(&mut pages);
     match prepared {
         Ok(()) => {}
-        Err(StoreError::Flash(FlashError::LowSupply)) => log.event(log::Event::LowSupply),
+        Err(WriteError::Flash(FlashError::LowSupply)) => log.event(log::Event::LowSupply),
         Err(_) => log.event(log::Event::SaveFailed),
     }
     // An erase that failed here is done by the background task, as after a change of pages.

@@ -4,16 +4,13 @@ use board_support::{
     CrcUnit, Flash, SLOT,
     flash::{BootPages, FlashError},
     kept,
-    pages::Slot as _,
+    pages::{Slot as _, WriteError},
 };
 use firmware::{
     device::Restart,
     update::{After, Done, InSlot, Job, Update, described},
 };
-use loader::{
-    Record,
-    journal::{Journal, JournalError},
-};
+use loader::{Record, journal::Journal};
 use register_map::update::Slot;
 use rtic::Mutex;
 
@@ -109,8 +106,8 @@ fn write(journal: &mut Journal, flash: &mut Flash, record: Record) -> Result<boo
     }
     match journal.write(&mut BootPages(flash), record) {
         Ok(()) => Ok(true),
-        Err(JournalError::Worn) => Ok(false),
-        Err(JournalError::Flash(error)) => Err(error),
+        Err(WriteError::Worn) => Ok(false),
+        Err(WriteError::Flash(error)) => Err(error),
     }
 }
 

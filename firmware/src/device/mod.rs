@@ -326,10 +326,14 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
     fn check_write_words(&self, span: Span, words: Words<'_>) -> Result<(), Exception> {
         match Block::of(span) {
             Block::Points => self.points.check_write_words(span, words),
-            Block::Config => Exception::first_of(
-                self.config.check_write(span, words),
-                self.check_order(span, words),
-            ),
+            Block::Config => {
+                let checked = self.config.check_write(span, words);
+                // Address and value come before the state.
+                if matches!(checked, Ok(()) | Err(Exception::ServerDeviceBusy)) {
+                    self.check_order(span, words)?;
+                }
+                checked
+            }
             Block::State | Block::Fault | Block::Radio => Err(Exception::IllegalDataAddress),
             Block::Pulses => {
                 check_exists(counters::SPANS, span)?;
@@ -393,20 +397,22 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
     }
 
     fn check_read_file(&self, file: u16, records: Span) -> Result<(), Exception> {
-        match &self.update {
-            Some(update) if file == status::FILE => update.check_read(records),
-            _ => self.description.check_read::<SLOTS>(file, records),
+        if file == status::FILE
+            && let Some(update) = &self.update
+        {
+            return update.check_read(records);
         }
+        self.description.check_read::<SLOTS>(file, records)
     }
 
     fn read_file(&self, file: u16, records: Span, out: &mut WordsOut<'_>) {
-        match &self.update {
-            Some(update) if file == status::FILE => {
-                let records = records.addresses();
-                records.for_each(|record| out.push(update.record(record)));
-            }
-            _ => self.description.read(&self.config, records, out),
+        if file == status::FILE
+            && let Some(update) = &self.update
+        {
+            let records = records.addresses();
+            return records.for_each(|record| out.push(update.record(record)));
         }
+        self.description.read(&self.config, records, out);
     }
 
     fn check_write_file(

@@ -40,7 +40,7 @@ use register_map::Board;
 use register_map::record::{Encoder, FIRST_OFFSET, SCHEMA, pair_of};
 
 use crate::config::Settings;
-pub use board_support::pages::{Page, Pages};
+pub use board_support::pages::{Page, Pages, WriteError};
 pub use operation::Operation;
 use operation::{Readying, Writing};
 pub use saving::Saving;
@@ -49,15 +49,6 @@ use survey::{Place, Survey, record_at};
 /// A start moves the newest record to the other page when fewer bytes than this follow it and older records precede
 /// it.
 const LITTLE_ROOM: usize = 256;
-
-/// Error of the store. It never damages what was stored before.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StoreError<E> {
-    /// The flash refused the operation or failed. The page may be worn out.
-    Flash(E),
-    /// The flash does not read back as programmed: the page is worn out.
-    Worn,
-}
 
 /// The configuration that a start found.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -122,12 +113,12 @@ impl Store {
     /// # Errors
     ///
     /// When the flash fails. The stored configuration is still valid, and later saves are still tried.
-    pub fn prepare<F: Pages>(&mut self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
+    pub fn prepare<F: Pages>(&mut self, flash: &mut F) -> Result<(), WriteError<F::Error>> {
         // Use the survey that selected the configuration in force. A second survey could find another record,
         // because a seal whose programming was interrupted may read differently every time.
         let sealed = self.seal_again(flash);
         // When a seal is worn out, move the record, as from any page that cannot take more records.
-        if let Err(StoreError::Flash(..)) = sealed {
+        if let Err(WriteError::Flash(..)) = sealed {
             return sealed;
         }
         let result = match self.newest() {
@@ -153,7 +144,7 @@ impl Store {
     /// # Errors
     ///
     /// When the flash fails. The stored configuration is still valid.
-    pub fn make_spare<F: Pages>(&mut self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
+    pub fn make_spare<F: Pages>(&mut self, flash: &mut F) -> Result<(), WriteError<F::Error>> {
         let result = match self.newest() {
             Some(newest) => self.make_ready(newest.page.other(), flash),
             None => Ok(()),
@@ -164,7 +155,7 @@ impl Store {
 
     /// Programs the seals of the newest record again when the power was cut between them, because the first one may
     /// not read the same every time.
-    fn seal_again<F: Pages>(&self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
+    fn seal_again<F: Pages>(&self, flash: &mut F) -> Result<(), WriteError<F::Error>> {
         let Some(Newest { page, place }) = self.newest().filter(|newest| newest.place.sealed == 1)
         else {
             return Ok(());
@@ -183,7 +174,7 @@ impl Store {
         &self,
         newest: Newest,
         flash: &mut F,
-    ) -> Result<(), StoreError<F::Error>> {
+    ) -> Result<(), WriteError<F::Error>> {
         let Newest { page, place } = newest;
         let offset = place.offset;
         let to = page.other();
@@ -217,7 +208,7 @@ impl Store {
     }
 
     /// Prepares one page when something was stored but no record is valid. The other page is left unchanged.
-    fn make_one_ready<F: Pages>(&self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
+    fn make_one_ready<F: Pages>(&self, flash: &mut F) -> Result<(), WriteError<F::Error>> {
         if self.first.is_ready() || self.second.is_ready() {
             return Ok(());
         }
@@ -228,7 +219,7 @@ impl Store {
     /// in the first save. It uses a page that needs no erase, so that a power cut here leaves nothing that looks
     /// like a damaged configuration. Exception: when only the first page is blank, an erase may have been
     /// interrupted here before, so the page must be erased again before it is programmed.
-    fn begin<F: Pages>(&self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
+    fn begin<F: Pages>(&self, flash: &mut F) -> Result<(), WriteError<F::Error>> {
         let page = if self.first.blank || self.first.is_ready() || !self.second.blank {
             Page::First
         } else {
@@ -246,7 +237,7 @@ impl Store {
         self.make_ready(page.other(), flash)
     }
 
-    fn make_ready<F: Pages>(&self, page: Page, flash: &mut F) -> Result<(), StoreError<F::Error>> {
+    fn make_ready<F: Pages>(&self, page: Page, flash: &mut F) -> Result<(), WriteError<F::Error>> {
         let survey = self.survey(page);
         if survey.is_ready() {
             return Ok(());
@@ -304,7 +295,7 @@ impl Store {
 fn perform_all<F: Pages>(
     flash: &mut F,
     next: &mut dyn FnMut() -> Option<Operation>,
-) -> Result<(), StoreError<F::Error>> {
+) -> Result<(), WriteError<F::Error>> {
     while let Some(operation) = next() {
         operation.perform(flash)?;
     }

@@ -2,7 +2,7 @@
 
 use register_map::record::{Encoder, PAGE_MARK};
 
-use super::{Page, Pages, StoreError};
+use super::{Page, Pages, WriteError};
 
 /// One flash operation, the longest step during which nothing else can run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,25 +26,25 @@ impl Operation {
     /// # Errors
     ///
     /// When the flash failed or does not read back as expected.
-    pub fn perform<F: Pages>(self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
+    pub fn perform<F: Pages>(self, flash: &mut F) -> Result<(), WriteError<F::Error>> {
         match self {
             Self::Program { page, offset, half } => {
                 let done = flash.program(page, offset, half);
-                done.map_err(StoreError::Flash)?;
+                done.map_err(WriteError::Flash)?;
                 let read = flash.page(page).get(offset..).unwrap_or_default();
                 if read.first_chunk() == Some(&half.to_le_bytes()) {
                     Ok(())
                 } else {
-                    Err(StoreError::Worn)
+                    Err(WriteError::Worn)
                 }
             }
             Self::Erase(page) => {
                 let done = flash.erase(page);
-                done.map_err(StoreError::Flash)?;
+                done.map_err(WriteError::Flash)?;
                 if flash.page(page).iter().all(|byte| *byte == 0xFF) {
                     Ok(())
                 } else {
-                    Err(StoreError::Worn)
+                    Err(WriteError::Worn)
                 }
             }
         }

@@ -4,7 +4,7 @@ use register_map::record::{Encoder, FIRST_OFFSET, SCHEMA};
 
 use super::operation::{Operation, Readying, Writing};
 use super::survey::record_at;
-use super::{Page, Pages, Store, StoreError};
+use super::{Page, Pages, Store, WriteError};
 use crate::config::Settings;
 
 /// A save under way. Pass the same settings to every step.
@@ -64,13 +64,13 @@ impl Saving {
         &self,
         store: &mut Store,
         flash: &F,
-    ) -> Result<(), StoreError<F::Error>> {
+    ) -> Result<(), WriteError<F::Error>> {
         store.survey_again(flash);
         match store.newest() {
             Some(newest) if newest.place.sequence == self.sequence => Ok(()),
             _ => {
                 store.avoid(self.writing.page);
-                Err(StoreError::Worn)
+                Err(WriteError::Worn)
             }
         }
     }

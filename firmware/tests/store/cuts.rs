@@ -2,7 +2,7 @@
 //! leave. The next start must find the complete old or new configuration, and later saves must work.
 
 use firmware::config::Settings;
-use firmware::store::{Operation, Page, Pages, Store, StoreError};
+use firmware::store::{Operation, Page, Pages, Store, WriteError};
 use register_map::board::MODIO_02;
 
 use crate::PAGE_SIZE;
@@ -280,7 +280,7 @@ fn cut_in_a_half_word_that_then_reads_as_erased_only_at_the_start_is_recovered()
         assert!(loaded.settings == old && !loaded.invalid, "{starts}");
         if let Err(failure) = save(&mut store, &mut flash, &new) {
             assert!(
-                matches!(failure, StoreError::Flash(Fault::NotErased)),
+                matches!(failure, WriteError::Flash(Fault::NotErased)),
                 "{starts}: {failure:?}"
             );
             refused += 1;

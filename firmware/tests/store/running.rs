@@ -1,7 +1,7 @@
 //! The steps of a device's life that concern the store.
 
 use firmware::config::Settings;
-use firmware::store::{Loaded, Saving, Store, StoreError};
+use firmware::store::{Loaded, Saving, Store, WriteError};
 use register_map::board::MODIO_02;
 use register_map::configuration::{COMMAND, KEY, RULES, module_of};
 use register_map::rule_at;
@@ -11,7 +11,7 @@ use crate::flash::{Fault, MockFlash, Noise};
 /// MODULE of the board's port.
 const MODULE_SLOT: u16 = module_of(5);
 
-pub type Failure = StoreError<Fault>;
+pub type Failure = WriteError<Fault>;
 
 /// Starts the device: loads the configuration and prepares the store.
 pub fn start(flash: &mut MockFlash) -> (Loaded, Result<Store, Failure>) {

@@ -1,7 +1,7 @@
 //! The wear of the flash, and the behaviour when the flash is worn out.
 
 use firmware::config::Settings;
-use firmware::store::{Page, StoreError};
+use firmware::store::{Page, WriteError};
 use register_map::board::MODIO_02;
 
 use crate::flash::{MockFlash, Noise};
@@ -101,7 +101,7 @@ fn a_worn_half_word_fails_a_save_and_keeps_the_stored_configuration() {
                 Ok(saved) => assert!(saved),
                 Err(error) => {
                     failures += 1;
-                    assert_eq!(error, StoreError::Worn);
+                    assert_eq!(error, WriteError::Worn);
                     // The record already counts when the second seal is programmed.
                     let stored = store.load(&MODIO_02, &flash).settings;
                     assert!(stored == old || stored == new);

@@ -2,6 +2,7 @@
 
 use super::{Diagnostics, Server};
 use crate::diagnostic::Diagnostic;
+use crate::exception::first_of;
 use crate::{
     Adu, BitsOut, DataModel, Exception, Function, Span, Table, Words, WordsOut, file,
     identification, pdu,
@@ -127,7 +128,7 @@ pub(super) fn execute(
         }
         Function::ReadWriteMultipleRegisters => {
             let (read, write, words) = pdu::write_then_read(fields)?;
-            Exception::first_of(
+            first_of(
                 model.check_write_words(write, words),
                 model.check_read_words(Table::HoldingRegisters, read),
             )?;

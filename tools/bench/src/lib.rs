@@ -4,6 +4,7 @@
 //! `cargo xtask bench` builds the images, runs this crate, adds the sizes, shows the result and compares it with
 //! the baseline. This crate only measures.
 
+pub mod boot;
 mod framing;
 pub mod load;
 pub mod requests;
@@ -43,14 +44,21 @@ pub struct Report {
     pub requests: Vec<Row>,
     /// The load of the processor.
     pub load: Vec<load::Load>,
+    /// The times of the loader.
+    pub boot: Vec<boot::Boot>,
 }
 
-/// Measures the image of a board, and the rivals with their names.
+/// Measures the image of a board, its loader with a signed image, and the rivals with their names.
 ///
 /// # Errors
 ///
 /// When the image does not serve a request correctly: names the request and the error.
-pub fn measure(image: &Image, board: &Board, rivals: &[(String, Image)]) -> Result<Report, String> {
+pub fn measure(
+    image: &Image,
+    (loader, signed): (&Image, &[u8]),
+    board: &Board,
+    rivals: &[(String, Image)],
+) -> Result<Report, String> {
     let mut units: BTreeMap<(&str, u16), Unit> = BTreeMap::new();
     let mut rivals = rivals
         .iter()
@@ -93,5 +101,10 @@ pub fn measure(image: &Image, board: &Board, rivals: &[(String, Image)]) -> Resu
             }
         }
     }
-    Ok(Report { requests, load })
+    let boot = boot::measure(loader, signed, board)?;
+    Ok(Report {
+        requests,
+        load,
+        boot,
+    })
 }

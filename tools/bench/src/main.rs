@@ -16,6 +16,12 @@ struct Cli {
     /// The board that it is for: modio-02 or modio-08
     #[arg(long, value_name = "NAME")]
     board: &'static Board,
+    /// The loader
+    #[arg(long, value_name = "ELF")]
+    loader: PathBuf,
+    /// The signed image for slot A
+    #[arg(long, value_name = "FILE")]
+    signed: PathBuf,
     /// Minimal servers on other crates, named after their files
     #[arg(long, value_name = "ELF", num_args = 1..)]
     rivals: Vec<PathBuf>,
@@ -44,7 +50,10 @@ fn run(cli: &Cli) -> Result<(), String> {
             Ok((name.into_owned(), read(path)?))
         })
         .collect::<Result<Vec<_>, String>>()?;
-    let report = bench::measure(&image, cli.board, &rivals)?;
+    let loader = read(&cli.loader)?;
+    let signed = std::fs::read(&cli.signed)
+        .map_err(|error| format!("cannot read {}: {error}", cli.signed.display()))?;
+    let report = bench::measure(&image, (&loader, &signed), cli.board, &rivals)?;
     let json = serde_json::to_string_pretty(&report).map_err(|error| error.to_string())?;
     println!("{json}");
     Ok(())

@@ -279,13 +279,13 @@ fn of_any_board(first: u16) -> Vec<Request> {
         alone("0B get comm event counter", SHORT, pdu(0x0B, &[])),
         alone("0C get comm event log", 3200, pdu(0x0C, &[])),
         alone("11 report server id", SHORT, pdu(0x11, &[])),
-        alone("14 read file record, 1", 1500, {
+        alone("14 read file record, 1", 1550, {
             vec![0x14, 7, 6, 0, 1, 0, 0, 0, 1]
         }),
         alone("14 read file record, 124", 4500, {
             vec![0x14, 7, 6, 0, 1, 1, 0, 0, 124]
         }),
-        alone("14 read file record, 35 groups of 2", 6400, {
+        alone("14 read file record, 35 groups of 2", 6600, {
             let groups = (0..35).flat_map(|group| [6, 0, 1, group, 0, 0, 2]);
             [0x14, 35 * 7].into_iter().chain(groups).collect()
         }),

@@ -42,6 +42,10 @@ pub struct Cli {
     #[arg(long, value_name = "FILE", requires = "flash")]
     pub elf: Option<PathBuf>,
 
+    /// Update the unit over the line first, by `modioctl update`, with this .modio file
+    #[arg(long, value_name = "FILE")]
+    pub update: Option<PathBuf>,
+
     /// Run this in a shell before the tests, to reset the board or to switch it on
     #[arg(long, value_name = "CMD")]
     pub reset_cmd: Option<String>,

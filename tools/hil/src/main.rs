@@ -25,6 +25,12 @@ fn test(cli: &Cli) -> anyhow::Result<u8> {
     if let Some(reset) = setup.reset() {
         shell::run(reset)?;
     }
+    if let Some(file) = &cli.update {
+        // The other program needs the port.
+        drop(endpoint);
+        shell::update(&setup.reached(), file)?;
+        endpoint = setup.open()?;
+    }
     let stop = interrupt::catch()?;
     let mut report = Report {
         about: About::here(setup.port(), register_map::commit!()),

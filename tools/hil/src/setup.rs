@@ -60,6 +60,10 @@ impl Setup {
         port.filter(|_| self.cli.tcp.is_none())
     }
 
+    fn unit(&self) -> u8 {
+        self.cli.unit.or(self.file.unit).unwrap_or(1)
+    }
+
     fn line(&self) -> LineFormat {
         let usual = LineFormat::default();
         let format = self.cli.format.or(self.file.format);
@@ -92,6 +96,19 @@ impl Setup {
         })
     }
 
+    /// Returns the options with which modioctl reaches the unit.
+    pub fn reached(&self) -> Vec<String> {
+        let (option, place) = match self.port() {
+            Some(port) => ("--port", port.display().to_string()),
+            None => ("--tcp", self.cli.tcp.clone().unwrap_or_default()),
+        };
+        let (line, unit) = (self.line(), self.unit().to_string());
+        let (baud, format) = (line.baud.to_string(), line.format.to_string());
+        let options = [option, &place, "--baud", &baud, "--format", &format];
+        let options = options.into_iter().chain(["--unit", &unit]);
+        options.map(str::to_owned).collect()
+    }
+
     /// Returns the command that resets the board, if there is one.
     pub fn reset(&self) -> Option<&str> {
         let command = self.cli.reset_cmd.as_deref();
@@ -102,7 +119,7 @@ impl Setup {
     pub fn plan(&self, endpoint: &dyn Endpoint) -> Result<Plan> {
         let (cli, file) = (&self.cli, &self.file);
         Ok(Plan {
-            unit: cli.unit.or(file.unit).unwrap_or(1),
+            unit: self.unit(),
             module: cli.module.or(file.module),
             patience: waits(endpoint, cli.patience.map(Duration::from_millis)),
             allow_config: cli.allow_config,
@@ -172,6 +189,18 @@ mod tests {
         assert_eq!((plan.unit, plan.module), (9, Some(Module::Di4)));
         assert_eq!(setup(FILE, &["--tcp", "b:1"]).unwrap().port(), None);
         assert_eq!(setup(FILE, &[]).unwrap().flash(), None);
+    }
+
+    #[test]
+    fn modioctl_gets_port_line_and_unit() {
+        let reached = |arguments: &str| {
+            let arguments: Vec<_> = arguments.split(' ').collect();
+            setup("", &arguments).unwrap().reached().join(" ")
+        };
+        let serial = "--port /dev/b --baud 19200 --format 8E1 --unit 9";
+        assert_eq!(reached(serial), serial);
+        let tcp = "--tcp a:1 --baud 9600 --format 8N2 --unit 1";
+        assert_eq!(reached("--tcp a:1"), tcp);
     }
 
     #[test]

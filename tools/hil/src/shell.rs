@@ -1,6 +1,6 @@
 //! Other programs that write the image of the board, reset the board and switch its power.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
@@ -19,12 +19,24 @@ pub struct Flash {
     pub elf: Option<PathBuf>,
 }
 
+/// Updates the unit over the line by `modioctl update`, with these options of modioctl in front. A command that fails has
+/// printed the reason.
+pub fn update(options: &[String], file: &Path) -> Result<()> {
+    let mut command = cargo();
+    command.args(["run", "--quiet", "--package", "modioctl", "--"]);
+    command.args(options).arg("update").arg(file);
+    status(&mut command, "modioctl update")
+}
+
+/// Returns the cargo that runs xtask, so that both use the same toolchain.
+fn cargo() -> Command {
+    Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+}
+
 impl Flash {
     /// Writes the image by `cargo xtask flash`. A command that fails has printed the reason.
     pub fn write(&self) -> Result<()> {
-        // The cargo that runs xtask, so that both use the same toolchain.
-        let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-        let mut command = Command::new(cargo);
+        let mut command = cargo();
         command.args(["xtask", "flash"]);
         if let Some(probe) = &self.probe {
             command.arg("--probe").arg(probe);

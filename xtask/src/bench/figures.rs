@@ -22,13 +22,22 @@ pub const COLUMNS: [(&str, &str, Option<f64>); 7] = [
     ("scan_held", "scan held", Some(72_000.0)),
 ];
 
-/// Flash and RAM of the image, and of the server with every function and two buffers: part, memory, and the bytes that
-/// the design allows.
-const SIZES: [(&str, &str, Option<f64>); 4] = [
+/// Flash and RAM of the image that runs alone, of the application in a slot, of the loader, and of the server with every
+/// function and two buffers: part, memory, and the bytes that the design allows.
+const SIZES: [(&str, &str, Option<f64>); 6] = [
     ("image", "flash", None),
     ("image", "ram", None),
+    ("slot", "flash", None),
+    ("loader", "flash", Some(16_384.0)),
     ("server", "flash", Some(9216.0)),
     ("server", "ram", Some(900.0)),
+];
+
+/// Times of the loader, in milliseconds, that the design allows at the nominal and at the slow corner: a start, and the
+/// check of a new image.
+const BOOT: [(&str, [f64; 2]); 2] = [
+    ("start_ms", [100.0, 100.0]),
+    ("check_ms", [3_000.0, 4_000.0]),
 ];
 
 /// Interrupts of the line, and the longest time in microseconds that locks and other handlers may delay them, at the
@@ -102,8 +111,17 @@ fn figures(report: &Value) -> Vec<Figure> {
             add(name, &us.into(), of_line.then_some(most), None);
         }
     }
+    for row in rows(report, "boot") {
+        let corner = row["corner"].as_str().unwrap_or_default();
+        for (key, [nominal, slow]) in BOOT {
+            let most = if corner == "slow" { slow } else { nominal };
+            let name = format!("loader, {corner} corner: {key}");
+            add(name, &row[key], Some(most), Some(TOLERANCE));
+        }
+    }
     for (part, memory, budget) in SIZES {
         let name = format!("{part}: {memory}");
+        let budget = report[part]["budget"].as_f64().or(budget);
         add(name, &report[part][memory], budget, Some(TOLERANCE));
     }
     figures

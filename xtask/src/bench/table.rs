@@ -48,9 +48,10 @@ pub fn of(report: &Value) -> String {
         .iter()
         .map(|over| format!("\nover budget: {over}"))
         .collect();
-    let (requests, load, image) = (requests(report), load(report), image(report));
+    let (requests, load) = (requests(report), load(report));
+    let (boot, image) = (boot(report), image(report));
     format!(
-        "{requests}\n{LEGEND}\nbudgets of every row: {budgets}the bytes in RTU mode only\n\n{load}\n\n{image}{over}"
+        "{requests}\n{LEGEND}\nbudgets of every row: {budgets}the bytes in RTU mode only\n\n{load}\n\n{boot}\n\n{image}{over}"
     )
 }
 
@@ -99,12 +100,28 @@ fn load(report: &Value) -> String {
     table::text(&[first, "answered", "awake", last], rows)
 }
 
+fn boot(report: &Value) -> String {
+    let ms = |value: &Value| format!("{:.0} ms", value.as_f64().unwrap_or_default());
+    let rows = rows(report, "boot").map(|row| {
+        let cells = [ms(&row["start_ms"]), ms(&row["check_ms"])];
+        [name(row, "corner"), cells[0].clone(), cells[1].clone()]
+    });
+    let heading = [
+        "loader, corner",
+        "power-on to application",
+        "check of an image",
+    ];
+    table::text(&heading, rows)
+}
+
 fn image(report: &Value) -> String {
     let row = |name: String, row: &Value| [name, number(&row["flash"]), number(&row["ram"])];
     let crates = rows(&report["image"], "crates").map(|taken| row(name(taken, "name"), taken));
     let server = "the server alone, with two buffers".to_owned();
     let sums = [
-        row("image".to_owned(), &report["image"]),
+        row("image that runs alone".to_owned(), &report["image"]),
+        row("application in a slot".to_owned(), &report["slot"]),
+        row("loader".to_owned(), &report["loader"]),
         row(server, &report["server"]),
     ];
     table::figures(&["crate", "flash", "RAM"], crates.chain(sums))

@@ -6,7 +6,7 @@ use ed25519_dalek::{Signer as _, SigningKey};
 use register_map::configuration::MODULE;
 use register_map::update::crc32;
 use sha2::{Digest as _, Sha512};
-use sim::{Config, Image, Time, chip};
+use sim::{Config, Image, Module, Time, chip};
 
 use crate::{
     LAYOUT,
@@ -66,12 +66,16 @@ pub fn with_crc(image: &mut [u8]) {
     image[CRC..CRC + 4].copy_from_slice(&crc.to_le_bytes());
 }
 
-/// Returns a board just powered on, with these images in its slots, and one module and these settings in its
-/// configuration.
+/// Returns a board just powered on, with these images in its slots, and a 4DI and these settings in its configuration.
 pub fn unit(slots: [&[u8]; 2], settings: &[(u16, u16)]) -> Bench {
+    holding(flash(slots, Module::Di4, settings), 1)
+}
+
+/// Returns a flash with the loader's images and the store at its place, and with a module and these settings in it.
+pub fn flash(slots: [&[u8]; 2], module: Module, settings: &[(u16, u16)]) -> Vec<u8> {
     let layout = LAYOUT.board.layout();
     let offset = |address: u32| (address - 0x0800_0000) as usize;
-    let module = [(MODULE + PORT - 1, 1)];
+    let module = [(MODULE + PORT - 1, module.code())];
     let mut flash = flash_with_settings(&[&module, settings].concat());
     let [stored, _] = pages();
     let page = flash[stored.clone()].to_vec();
@@ -82,13 +86,19 @@ pub fn unit(slots: [&[u8]; 2], settings: &[(u16, u16)]) -> Bench {
         let at = offset(address);
         flash[at..at + image.len()].copy_from_slice(image);
     }
-    holding(flash, 1)
+    flash
 }
 
-/// Returns a board just powered on, with these bytes in its flash and this switch.
+/// Returns a board just powered on, with these bytes in its flash, this switch and a 4DI.
 pub fn holding(flash: Vec<u8>, dip: u8) -> Bench {
+    fitted(flash, Module::Di4, dip)
+}
+
+/// The same, with a module.
+pub fn fitted(flash: Vec<u8>, module: Module, dip: u8) -> Bench {
     let config = Config {
         dip,
+        module,
         chip: chip::Config::holding(flash),
         ..Config::default()
     };
@@ -110,7 +120,7 @@ pub fn answers_as(bench: &mut Bench, unit: u8, within: Time) -> Option<Time> {
         bench.board.run_for(Time::from_ms(20));
         if bench.ask(unit, &[3, 2, 5, 0, 1]).is_some() {
             let module = bench.ask(unit, &[3, 2, 0x0F + PORT as u8, 0, 1]);
-            assert_eq!(module.as_deref(), Some(&[3, 2, 0, 1][..]), "it is stored");
+            assert_ne!(module.as_deref(), Some(&[3, 2, 0, 0][..]), "it is stored");
             assert_eq!(bench.board.findings(), []);
             return Some(bench.board.now());
         }

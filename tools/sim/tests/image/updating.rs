@@ -3,17 +3,17 @@
 use std::sync::LazyLock;
 
 use register_map::codes::{Baud, Command};
-use register_map::configuration::{BAUD, COMMAND, KEY, OPENING_KEY};
+use register_map::configuration::{BAUD, COMM_TIMEOUT, COMMAND, KEY, OPENING_KEY};
 use register_map::state::UPDATE;
 use register_map::update::{BLOCK_BYTES, Slot, place_of, status};
-use sim::Time;
 use sim::line::{Format, Settings};
+use sim::{Module, Time};
 
 use crate::LAYOUT;
-use crate::bench::{Bench, PAGE_SIZE};
+use crate::bench::{Bench, PAGE_SIZE, SLOT};
 use crate::slots::{
-    APPLICATION, CHECK, CRC, HASH, LENGTH, SIGNATURE, START, answers, answers_as, holding, image,
-    runs_from, sign, signed, unit, with_crc,
+    APPLICATION, CHECK, HASH, LENGTH, SIGNATURE, START, answers, answers_as, fitted, flash,
+    holding, image, runs_from, sign, signed, unit, with_crc,
 };
 
 /// The state of an update, from file 2.
@@ -456,6 +456,62 @@ fn absurd_bounds_in_a_new_header_are_refused() {
         let (slot, status) = after(&mut bench);
         let refused = (slot, status.state, status.reason);
         assert_eq!(refused, (0, REJECTED, reason), "{number:#x} at {at}");
+    }
+}
+
+/// Points are read and outputs written all the time, at every kind of rate; a reply waits for the erase of a page at
+/// most, which is what [`Bench::ask`] allows.
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn the_points_are_served_and_no_byte_is_lost_during_an_update() {
+    for baud in [Baud::B9600, Baud::B115200, Baud::B921600] {
+        let stored = [(BAUD, baud.code())];
+        let slots = [&image(0)[..], &[]];
+        let mut bench = fitted(flash(slots, Module::Do4, &stored), Module::Do4, 1);
+        bench.settings(Settings {
+            baud: baud.bits_per_second(),
+            ..Settings::default()
+        });
+        answers(&mut bench, CHECK + START).expect("it starts");
+        bench.patience = ERASE;
+        bench.configure(COMM_TIMEOUT, &[3]);
+        bench.write_bits(SLOT, &[true, false, true, false]).unwrap();
+        bench.board.run_for(Time::from_ms(10));
+        (0..3).for_each(|pin| bench.board.watch_pin('A', pin));
+        let mut switches = 0;
+        let mut serve = |bench: &mut Bench| {
+            switches += 1;
+            let on = switches % 2 == 0;
+            bench.write_bit(SLOT + 3, on).unwrap();
+            let all = Ok(vec![true, false, true, on]);
+            assert_eq!(bench.bits(1, SLOT, 4), all, "{baud:?}");
+        };
+        assert_eq!(bench.order(Command::Prepare), Ok(()));
+        while bench.update_status().pages > 0 {
+            serve(&mut bench);
+        }
+        for (number, block) in (0..60).zip(image(1).chunks(BLOCK_BYTES)) {
+            while bench.block(Slot::B, number, block).is_err() {}
+            serve(&mut bench);
+        }
+        for pin in 0..3 {
+            assert_eq!(bench.board.pin_edges('A', pin), [], "{baud:?}");
+        }
+        // Errors, no response, overruns.
+        let counted = [0x0231, 0x0234, 0x0237].map(|address| bench.register(address));
+        assert_eq!(counted, [0; 3], "{baud:?}");
+        assert!(switches > 50);
+        // The communication watchdog trips at its time although a page is being erased.
+        assert_eq!(bench.order(Command::Prepare), Ok(()));
+        let last = bench.sent;
+        bench.board.run_for(Time::from_ms(400));
+        let edges = bench.board.pin_edges('A', 0);
+        let &[(at, false)] = edges else {
+            panic!("the output did not go off: {edges:?}");
+        };
+        let took = at - last;
+        let due = Time::from_ms(298)..Time::from_ms(302) + ERASE;
+        assert!(due.contains(&took), "{took:?}");
     }
 }
 
