@@ -81,6 +81,8 @@ pub enum Command {
     Describe,
     /// Write a configuration of another system for the unit, or for several units of the line
     Export(Export),
+    /// Bring new firmware to the unit, or to several units of the line
+    Update(Update),
     /// Restart the unit
     Reboot,
     /// Blink all LEDs of the unit for 10 s
@@ -338,6 +340,44 @@ pub struct Export {
     /// Overwrite an existing file
     #[arg(long)]
     pub force: bool,
+}
+
+/// Bring new firmware to the unit.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+The units serve their points until they restart with the new firmware. It stays once they have reported it over this line; \
+otherwise the one before comes back, after 15 minutes at most. Nothing is sent unless the file suits every unit. After an \
+interruption the same command goes on where it stopped.
+
+All units get the same blocks together, by broadcast. When anything answers a broadcast, when broadcasts do not arrive, and \
+over Modbus TCP, each unit gets them alone. Over the air use --unicast.")]
+pub struct Update {
+    /// The file with the firmware, such as modio-02.modio
+    #[arg(value_name = "FILE", required_unless_present_any = ["status", "back"])]
+    pub file: Option<PathBuf>,
+    /// Addresses of the units, such as 1-30; default: the unit of the endpoint
+    #[arg(long, value_name = "LIST", value_parser = units)]
+    pub units: Option<List<u8>>,
+    /// Show what the units run and what their other slots hold
+    #[arg(long, conflicts_with = "file")]
+    pub status: bool,
+    /// Start the firmware that the units ran before, and keep it
+    #[arg(long, conflicts_with_all = ["file", "status"])]
+    pub back: bool,
+    /// Send the blocks to each unit alone
+    #[arg(long, conflicts_with_all = ["status", "back"])]
+    pub unicast: bool,
+    /// Send the firmware to units that already run it as well
+    #[arg(long, conflicts_with_all = ["status", "back"])]
+    pub force: bool,
+    /// Print these points of the endpoint's unit every second between the blocks, such as p5.1,p5.2
+    #[arg(
+        long,
+        value_name = "NAME",
+        value_delimiter = ',',
+        conflicts_with = "status"
+    )]
+    pub poll: Vec<String>,
 }
 
 /// Parses the number of times of a command.

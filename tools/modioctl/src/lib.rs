@@ -16,6 +16,7 @@ pub mod names;
 mod output;
 mod sniff;
 mod trace;
+pub mod update;
 mod value;
 
 pub use commands::run;

@@ -85,7 +85,8 @@ fn register(value: &Value, words: &[u16], raw: bool) -> Shown {
     }
 }
 
-fn text(text: &str) -> Shown {
+/// Returns a text as a value.
+pub fn text(text: &str) -> Shown {
     Shown {
         json: json!(text),
         text: text.to_owned(),

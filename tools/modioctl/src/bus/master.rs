@@ -182,12 +182,17 @@ impl Master {
     }
 
     /// Returns the time from which the next frame may be sent.
-    pub(super) const fn free(&self) -> Instant {
+    pub const fn free(&self) -> Instant {
         self.free
     }
 
+    /// Sets the time from which the next frame may be sent.
+    pub(super) const fn free_from(&mut self, time: Instant) {
+        self.free = time;
+    }
+
     /// Waits until the line is free, and discards received bytes: they answer no pending request.
-    async fn settle(&mut self, unit: u8, pdu: &[u8]) -> io::Result<()> {
+    pub(super) async fn settle(&mut self, unit: u8, pdu: &[u8]) -> io::Result<()> {
         if let Some((asked, request)) = self.owed.take()
             && self.endpoint.framing != Framing::Mbap
             && asked == unit
@@ -292,7 +297,7 @@ impl Master {
 
     /// Removes the request from the received bytes if the adapter returns it. Returns whether it did. Bytes that equal
     /// the request are an echo until a response that differs from its request has shown that there is none.
-    fn drop_echo(&mut self, own: &[u8], got: &mut Vec<u8>) -> bool {
+    pub(super) fn drop_echo(&mut self, own: &[u8], got: &mut Vec<u8>) -> bool {
         let starts = 0..=NOISE.min(got.len());
         let mut starts = starts.filter(|start| got[*start..].starts_with(own));
         match starts.next() {

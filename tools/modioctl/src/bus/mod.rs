@@ -1,5 +1,6 @@
 //! A Modbus master: frames, the line, and the answers of units.
 
+mod broadcast;
 pub mod endpoint;
 mod master;
 mod stream;

@@ -4,6 +4,8 @@ use std::fmt;
 
 use modbus_line::names;
 use register_map::configuration::{BAUD, FRAME_GAP};
+use register_map::state::update;
+use register_map::update::State;
 use register_map::{fault, radio, state};
 use serde_json::{Map, Value as Json, json};
 
@@ -12,7 +14,7 @@ use crate::device::{Device, fetch};
 use crate::failure::Failure;
 use crate::names::{Item, Meaning};
 use crate::output;
-use crate::value::show;
+use crate::value::{Shown, show, text};
 
 /// Names of the first objects of the device identification (V1.1b3, 6.21).
 const OBJECTS: [&str; 7] = [
@@ -33,7 +35,7 @@ const GROUPS: [&str; 7] = [
 const fn group(address: u16) -> &'static str {
     match address {
         BAUD..=FRAME_GAP | state::UNIT_ADDRESS => "line",
-        state::RESET_CAUSE..=state::STACK_FREE => "state",
+        state::RESET_CAUSE..=state::STACK_FREE | state::UPDATE => "state",
         state::MODULE_IN_FORCE..state::UNIQUE_ID | state::CHANNEL_STATUS..fault::KIND => "modules",
         state::BUS_MESSAGES..state::CHANNEL_STATUS | radio::BUS_MESSAGES..=radio::T15_GAPS => {
             "counters"
@@ -71,17 +73,53 @@ pub async fn run(device: &mut Device, json: bool) -> Result<(), Failure> {
             .map(|(name, text)| (name, json!(text)))
             .collect();
         for (item, words) in state.iter().zip(&values) {
-            out.insert(item.name.clone(), show(item, words, false).json);
+            out.insert(item.name.clone(), shown(item, words).json);
         }
         return output::json(&out);
     }
     let identity = identity.into_iter();
     let identity = identity.map(|(name, text)| (GROUPS[0], [name, text]));
     let state = state.iter().zip(&values).map(|(item, words)| {
-        let shown = show(item, words, false).to_string();
+        let shown = shown(item, words).to_string();
         (group(item.address), [item.name.clone(), shown])
     });
     output::table(&grouped(&identity.chain(state).collect::<Vec<_>>()))
+}
+
+/// Returns a value as shown. Register UPDATE has parts that only this program names.
+fn shown(item: &Item, words: &[u16]) -> Shown {
+    match (item.address, words) {
+        (state::UPDATE, [word]) => text(&slots(*word)),
+        _ => show(item, words, false),
+    }
+}
+
+/// Describes the value of register UPDATE: the slots, and which of them runs.
+fn slots(word: u16) -> String {
+    let (runs, other) = match word & update::SLOT {
+        1 => ("A", "B"),
+        2 => ("B", "A"),
+        _ => return "no loader".to_owned(),
+    };
+    let is_set = |bit, yes, no| if word & bit == 0 { no } else { yes };
+    let code = (word >> update::OTHER_SHIFT & 0b111) as u8;
+    // A rejected image has a reason, which the register does not contain.
+    let detail = if code == 6 { 1 } else { 0 };
+    let other_state = match State::from_code(code, detail) {
+        Some(State::Empty) => "empty",
+        Some(State::Receiving) => "receiving",
+        Some(State::New) => "not checked yet",
+        Some(State::Checking) => "being checked",
+        Some(State::Trial(_)) => "on trial",
+        Some(State::Confirmed) => "confirmed",
+        Some(State::Rejected(_)) => "rejected",
+        None => "unknown",
+    };
+    format!(
+        "slot {runs} runs, {}{}; slot {other} {other_state}",
+        is_set(update::TRIAL, "on trial", "confirmed"),
+        is_set(update::SWITCHED, ", chosen by SW01 = 254", ""),
+    )
 }
 
 /// Returns the rows of each group under its name, with an empty row between groups.
@@ -189,6 +227,7 @@ mod tests {
             ("p1.module_in_force", "modules"),
             ("p1.1.channel_status", "modules"),
             ("uptime", "state"),
+            ("update", "state"),
             ("fault_kind", "faults"),
             ("line_repairs", "faults"),
             ("bus_messages", "counters"),
@@ -199,6 +238,15 @@ mod tests {
         let state = || book.items().iter().filter(|item| is_state(item));
         assert!(state().all(|item| group(item.address) != "others"));
         assert!(state().all(|item| !item.name.contains("reserved")));
+    }
+
+    #[test]
+    fn register_update_is_shown_in_words() {
+        assert_eq!(slots(0), "no loader");
+        assert_eq!(slots(0b1_0110), "slot B runs, confirmed; slot A confirmed");
+        assert_eq!(slots(0b11_1001), "slot A runs, on trial; slot B rejected");
+        let switched = "slot A runs, confirmed, chosen by SW01 = 254; slot B empty";
+        assert_eq!(slots(0b100_0001), switched);
     }
 
     #[test]

@@ -10,6 +10,7 @@ mod raw;
 mod read;
 mod scan;
 mod sniff;
+mod update;
 mod watch;
 mod write;
 
@@ -94,6 +95,9 @@ async fn dispatch(mut cli: Cli, note: &Note) -> Result<(), Failure> {
         return sniff::run(&endpoint, &options, json).await;
     }
     let observer = cli.trace.then(trace::to_stderr);
+    if let Command::Update(options) = cli.command {
+        return update::run(endpoint, observer, &options, json, note).await;
+    }
     let mut device = Device::open(endpoint, observer).await?;
     device.refresh = cli.refresh;
     match cli.command {
@@ -109,6 +113,7 @@ async fn dispatch(mut cli: Cli, note: &Note) -> Result<(), Failure> {
         Command::Reboot => module::reboot(device).await,
         Command::Identify => module::identify(&mut device).await,
         Command::Scan(_)
+        | Command::Update(_)
         | Command::Monitor(_)
         | Command::Sniff(_)
         | Command::Ports

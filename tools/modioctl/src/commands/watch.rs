@@ -9,7 +9,7 @@ use crate::device::{Device, fetch};
 use crate::failure::Failure;
 use crate::names::{Book, Item};
 use crate::output::{self, csv_field};
-use crate::value::{Shown, show};
+use crate::value::show;
 
 /// Prints values until it is stopped. Waits for a unit that is lost.
 pub async fn run(mut device: Device, options: &Watch) -> Result<(), Failure> {
@@ -30,11 +30,7 @@ pub async fn run(mut device: Device, options: &Watch) -> Result<(), Failure> {
                     eprintln!("modioctl: the unit is back");
                     lost = false;
                 }
-                let shown = items.iter().zip(&values);
-                let shown: Vec<_> = shown
-                    .map(|(item, words)| show(item, words, options.raw))
-                    .collect();
-                print(Local::now(), &items, &shown, options)?;
+                print(Local::now(), &items, &values, options)?;
                 printed += 1;
             }
             Err(failure) if failure.may_pass() => {
@@ -78,18 +74,23 @@ pub fn chosen(book: &Book, names: &[String]) -> Result<Vec<Item>, Failure> {
     Ok(points)
 }
 
-fn print(
+/// Prints values that were read at this time, in the form of the options.
+pub fn print(
     now: DateTime<Local>,
     items: &[Item],
-    shown: &[Shown],
+    values: &[Vec<u16>],
     options: &Watch,
 ) -> Result<(), Failure> {
+    let shown = items.iter().zip(values);
+    let shown: Vec<_> = shown
+        .map(|(item, words)| show(item, words, options.raw))
+        .collect();
     let time = now.to_rfc3339_opts(SecondsFormat::Millis, false);
     if options.csv {
         let values: Vec<_> = shown.iter().map(|shown| csv_field(&shown.text)).collect();
         return output::line(format_args!("{time},{}", values.join(",")));
     }
-    let both = items.iter().zip(shown);
+    let both = items.iter().zip(&shown);
     if options.json_lines {
         let mut object: Map<String, Json> = both
             .map(|(item, shown)| (item.name.clone(), shown.json.clone()))

@@ -22,3 +22,4 @@ mod served;
 mod terminal;
 mod trouble;
 mod unit;
+mod updating;

@@ -1,0 +1,155 @@
+//! `modioctl update`.
+
+mod drive;
+mod found;
+mod progress;
+mod report;
+
+use std::time::Duration;
+
+use register_map::update::Slot;
+
+use super::config::Note;
+use super::watch::chosen;
+use crate::bus::adu::Framing;
+use crate::bus::{Endpoint, Observer};
+use crate::cli::Update;
+use crate::device::{Device, fetch};
+use crate::failure::Failure;
+use crate::update::{Campaign, Fault, File, Stage, Unit};
+use drive::{Drive, Poll};
+use found::look;
+use progress::Progress;
+use report::{Transfer, report, show};
+
+/// What is added to the time of the longest answer until a unit counts as silent for now.
+const MARGIN: Duration = Duration::from_millis(100);
+
+/// Updates units, or shows what they run.
+pub async fn run(
+    endpoint: Endpoint,
+    observer: Option<Observer>,
+    options: &Update,
+    json: bool,
+    note: &Note,
+) -> Result<(), Failure> {
+    let file = options.file.as_deref().map(File::read).transpose()?;
+    let mut device = Device::open(endpoint, observer).await?;
+    let only = [device.unit];
+    let addresses = options.units.as_deref().unwrap_or(&only);
+    let mut found = Vec::new();
+    let mut failed = Vec::new();
+    for address in addresses {
+        match look(&mut device, *address).await {
+            Ok(unit) => found.push(unit),
+            Err(failure @ Failure::Port(_)) => return Err(failure),
+            Err(failure) => failed.push(failure),
+        }
+    }
+    if options.status {
+        show(&found, json)?;
+        return all(failed);
+    }
+    let mut units = Vec::new();
+    for unit in &found {
+        let fits = match &file {
+            Some(file) => unit.unit(file, options.force),
+            None => unit.back(),
+        };
+        match fits {
+            Ok(unit) => units.push(unit),
+            Err(what) => failed.push(Failure::Usage(format!("unit {} {what}", unit.address))),
+        }
+    }
+    refuse(&failed)?;
+    let poll = poll(&mut device, &options.poll, json).await?;
+    let endpoint = device.master.endpoint();
+    let longest = found.iter().map(|unit| unit.time).max();
+    let little = match endpoint.timeout_given {
+        true => endpoint.timeout,
+        false => endpoint.timeout.min(longest.unwrap_or_default() + MARGIN),
+    };
+    // The rate of the line behind a server of Modbus TCP is not known, so broadcasts could be too fast.
+    let unicast = options.unicast || endpoint.framing == Framing::Mbap;
+    "the same command goes on where it stopped".clone_into(&mut note.borrow_mut());
+    let mut drive = Drive {
+        device: &mut device,
+        little,
+        poll,
+        progress: Progress::default(),
+    };
+    let mut transfers = Vec::new();
+    let mut ended = Vec::new();
+    for units in groups(file.as_ref(), units) {
+        let slot = units.first().map_or(Slot::A, |unit| unit.target);
+        let blocks = file.as_ref().map(|file| file.image(slot).blocks.as_slice());
+        let mut campaign = Campaign::new(blocks.unwrap_or_default(), units, unicast);
+        let result = drive.run(&mut campaign).await;
+        drive.progress.clear();
+        transfers.push(Transfer {
+            times: result?,
+            blocks: blocks.map_or(0, <[_]>::len),
+            sent: campaign.blocks().0,
+            unicast: campaign.is_unicast(),
+        });
+        ended.extend_from_slice(campaign.units());
+    }
+    note.borrow_mut().clear();
+    report(&found, &ended, &transfers, device.master.endpoint(), json)?;
+    all(ended.iter().filter_map(failure).collect())
+}
+
+/// Returns the failure of a unit that was not updated.
+fn failure(unit: &Unit) -> Option<Failure> {
+    let Stage::Failed(fault) = unit.stage else {
+        return None;
+    };
+    let text = format!("unit {} {fault}", unit.address);
+    Some(match fault {
+        Fault::Silent => Failure::NoAnswer(text),
+        _ => Failure::Refused(text),
+    })
+}
+
+/// Returns the units that are updated together: those that take the image for the same slot. The way back has no image.
+fn groups(file: Option<&File>, units: Vec<Unit>) -> Vec<Vec<Unit>> {
+    let (a, b): (Vec<_>, Vec<_>) = units
+        .into_iter()
+        .partition(|unit| file.is_none() || unit.target == Slot::A);
+    let groups = [a, b].into_iter();
+    groups.filter(|units| !units.is_empty()).collect()
+}
+
+/// Fails with all units that cannot be updated, in one line.
+fn refuse(failed: &[Failure]) -> Result<(), Failure> {
+    let Some(first) = failed.first() else {
+        return Ok(());
+    };
+    let text: Vec<_> = failed.iter().map(Failure::to_string).collect();
+    let text = format!("nothing was sent: {}", text.join("; "));
+    Err(match first {
+        Failure::NoAnswer(_) => Failure::NoAnswer(text),
+        Failure::Garbled(_) => Failure::Garbled(text),
+        _ => Failure::Usage(text),
+    })
+}
+
+/// Reports each failure on a line of its own. Fails with the last one.
+fn all(mut failed: Vec<Failure>) -> Result<(), Failure> {
+    // The exit status is 1 if any unit refuses.
+    failed.sort_by_key(|failure| std::cmp::Reverse(failure.status()));
+    let last = failed.pop();
+    for failure in failed {
+        eprintln!("modioctl: {failure}");
+    }
+    last.map_or(Ok(()), Err)
+}
+
+/// Returns the poll of the points with these names.
+async fn poll(device: &mut Device, names: &[String], json: bool) -> Result<Option<Poll>, Failure> {
+    if names.is_empty() {
+        return Ok(None);
+    }
+    let items = chosen(&fetch(device).await?.book, names)?;
+    Ok(Some(Poll::new(items, json)))
+}

@@ -1,0 +1,198 @@
+use register_map::update::{Reason, Slot, State};
+
+use super::bus::Bus;
+use super::file::File;
+use super::file::tests::of_blocks;
+use super::model::Flaw;
+use super::{Campaign, Fault, Stage, Unit};
+
+/// Blocks of the image: 45 KiB, the largest that a modio-02 has.
+const BLOCKS: usize = 360;
+
+/// Runs whose times are averaged.
+const RUNS: u64 = 10;
+
+/// Returns the units of a line that are to take the image for slot B.
+fn units(bus: &Bus, file: &File, stage: Stage) -> Vec<Unit> {
+    let words = file.image(Slot::B).words;
+    let units = bus.units.iter();
+    units
+        .map(|unit| Unit::new(unit.address, Slot::B, words, stage))
+        .collect()
+}
+
+/// Updates the units of a line. Returns the plan at its end.
+fn update(bus: &mut Bus, unicast: bool) -> Campaign {
+    let file = of_blocks(BLOCKS);
+    let units = units(bus, &file, Stage::Waiting);
+    let mut campaign = Campaign::new(&file.image(Slot::B).blocks, units, unicast);
+    bus.run(&mut campaign);
+    for (unit, model) in campaign.units().iter().zip(&bus.units) {
+        if unit.stage == Stage::Done {
+            let content: Vec<_> = model.content.iter().map(|block| block.unwrap()).collect();
+            assert_eq!(content, file.image(Slot::B).blocks);
+            assert_eq!((model.runs, model.trial), (Slot::B, false));
+        }
+    }
+    campaign
+}
+
+fn stages(campaign: &Campaign) -> Vec<Stage> {
+    campaign.units().iter().map(|unit| unit.stage).collect()
+}
+
+#[test]
+fn on_a_clean_line_the_time_does_not_depend_on_the_number_of_units() {
+    for baud in [9600, 19_200, 57_600, 115_200] {
+        for count in [1, 30] {
+            let mut bus = Bus::new(baud, count);
+            let campaign = update(&mut bus, false);
+            assert_eq!(stages(&campaign), vec![Stage::Done; count.into()]);
+            let ratio = bus.ratio(BLOCKS);
+            assert!(ratio <= 1.3, "{baud} bit/s, {count} units: {ratio:.3}");
+        }
+    }
+}
+
+#[test]
+fn bit_errors_cost_what_is_missing_anywhere() {
+    for (errors, rates) in [
+        ([10.0, 0.0], [(9600, 1.6), (19_200, 1.6), (115_200, 1.6)]),
+        ([0.0, 10.0], [(9600, 1.7), (19_200, 1.7), (115_200, 1.9)]),
+    ] {
+        for (baud, most) in rates {
+            let ratios = (0..RUNS).map(|seed| {
+                let mut bus = Bus::new(baud, 30);
+                bus.errors = errors;
+                bus.random.seed(seed);
+                let campaign = update(&mut bus, false);
+                assert_eq!(stages(&campaign), [Stage::Done; 30]);
+                bus.ratio(BLOCKS)
+            });
+            let ratio = ratios.sum::<f64>() / RUNS as f64;
+            println!("{errors:?} {baud} {ratio}");
+            assert!(ratio <= most, "{errors:?} at {baud} bit/s: {ratio:.3}");
+        }
+    }
+}
+
+#[test]
+fn on_a_bad_line_every_unit_is_updated_in_the_end() {
+    for unicast in [false, true] {
+        let mut bus = Bus::new(115_200, 3);
+        bus.errors = [100.0, 100.0];
+        let campaign = update(&mut bus, unicast);
+        assert_eq!(stages(&campaign), [Stage::Done; 3], "{unicast}");
+    }
+}
+
+#[test]
+fn a_fast_line_is_slowed_down_to_the_speed_of_the_flash() {
+    let mut bus = Bus::new(921_600, 2);
+    let campaign = update(&mut bus, false);
+    assert_eq!(stages(&campaign), [Stage::Done; 2]);
+    let (sent, _) = campaign.blocks();
+    assert!(sent < BLOCKS + 10, "{sent}");
+}
+
+#[test]
+fn blocks_that_an_adapter_joins_are_sent_with_a_longer_pause() {
+    let mut bus = Bus::new(115_200, 2);
+    bus.joins = std::time::Duration::from_millis(10);
+    let campaign = update(&mut bus, false);
+    assert_eq!(stages(&campaign), [Stage::Done; 2]);
+    let (sent, _) = campaign.blocks();
+    assert!(sent < BLOCKS + 120, "{sent}");
+}
+
+#[test]
+fn blocks_are_sent_to_each_unit_alone_when_something_answers_broadcasts_or_they_do_not_arrive() {
+    let mut answers = Bus::new(115_200, 3);
+    answers.units[1].flaw = Flaw::AnswersBroadcasts;
+    let mut drops = Bus::new(115_200, 3);
+    drops.drops_broadcasts = true;
+    for mut bus in [answers, drops] {
+        let campaign = update(&mut bus, false);
+        assert!(campaign.is_unicast());
+        assert_eq!(stages(&campaign), [Stage::Done; 3]);
+        let (sent, _) = campaign.blocks();
+        assert!(sent < 3 * BLOCKS + 40, "{sent}");
+    }
+}
+
+#[test]
+fn a_unit_that_restarts_begins_again_and_one_that_is_gone_does_not_hold_up_the_others() {
+    let mut bus = Bus::new(115_200, 4);
+    bus.units[1].flaw = Flaw::RestartsAfter(100);
+    bus.units[2].flaw = Flaw::GoneAfter(200);
+    let campaign = update(&mut bus, false);
+    let (done, gone) = (Stage::Done, Stage::Failed(Fault::Silent));
+    assert_eq!(stages(&campaign), [done, done, gone, done]);
+    let (sent, _) = campaign.blocks();
+    assert!(sent < 2 * BLOCKS + 10, "{sent}");
+}
+
+#[test]
+fn a_host_that_was_interrupted_sends_only_what_is_missing() {
+    let file = of_blocks(BLOCKS);
+    for unicast in [false, true] {
+        let mut bus = Bus::new(115_200, 2);
+        let blocks = &file.image(Slot::B).blocks;
+        let mut first = Campaign::new(blocks, units(&bus, &file, Stage::Waiting), unicast);
+        while first.blocks().0 < 250 {
+            assert!(bus.step(&mut first));
+        }
+        bus.now += std::time::Duration::from_secs(1);
+        let mut second = Campaign::new(blocks, units(&bus, &file, Stage::Receiving), unicast);
+        bus.run(&mut second);
+        assert_eq!(stages(&second), [Stage::Done; 2]);
+        let left = if unicast { 2 * BLOCKS } else { BLOCKS } - 250;
+        let (sent, _) = second.blocks();
+        assert!((left..left + 10).contains(&sent), "{sent} of {left}");
+    }
+}
+
+#[test]
+fn blocks_of_a_unit_that_another_line_has_prepared_are_sent_after_it_is_prepared_again() {
+    let file = of_blocks(BLOCKS);
+    let mut bus = Bus::new(115_200, 1);
+    // The model takes no blocks, and reports that it receives.
+    bus.units[0].state = State::Receiving;
+    bus.units[0].flaw = Flaw::RestartsAfter(1);
+    let units = units(&bus, &file, Stage::Receiving);
+    let mut campaign = Campaign::new(&file.image(Slot::B).blocks, units, false);
+    bus.run(&mut campaign);
+    assert_eq!(stages(&campaign), [Stage::Done]);
+}
+
+#[test]
+fn a_wrong_crc_is_repaired_once_and_a_rejected_image_is_reported() {
+    let mut bus = Bus::new(115_200, 3);
+    bus.units[0].flaw = Flaw::WrongCrc;
+    bus.units[1].flaw = Flaw::Rejects(Reason::Signature);
+    bus.units[2].flaw = Flaw::ConfirmsLate;
+    let campaign = update(&mut bus, false);
+    let rejected = Stage::Failed(Fault::Rejected(Reason::Signature));
+    assert_eq!(stages(&campaign), [Stage::Done, rejected, Stage::Done]);
+    let text = Fault::Rejected(Reason::Signature).to_string();
+    assert!(text.contains("signature is not by a key"), "{text}");
+}
+
+#[test]
+fn the_way_back_needs_no_blocks_and_is_confirmed() {
+    let mut bus = Bus::new(9600, 2);
+    let older = [0x0002, 0, 0, 7, 8, 200, 0, 0];
+    for unit in &mut bus.units {
+        (unit.state, unit.images[1]) = (State::Confirmed, older);
+    }
+    let mut units: Vec<_> = [1, 2].map(|unit| Unit::back(unit, Slot::B, older)).into();
+    // An image that was exchanged since it was looked at is not kept.
+    bus.units[1].images[1][1] = 9;
+    units.truncate(2);
+    let mut campaign = Campaign::new(&[], units, false);
+    bus.run(&mut campaign);
+    let other = Stage::Failed(Fault::OtherImage);
+    assert_eq!(stages(&campaign), [Stage::Done, other]);
+    assert_eq!(campaign.blocks(), (0, 0));
+    assert_eq!([0, 1].map(|unit| bus.units[unit].trial), [false, true]);
+}

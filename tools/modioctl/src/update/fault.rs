@@ -1,0 +1,93 @@
+//! Why an update of a unit fails, for people.
+
+use std::fmt;
+
+use modbus_line::names;
+use register_map::update::Reason;
+
+/// Why a unit takes no further part. The texts say what to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// It does not answer.
+    Silent,
+    /// It refuses an order or a block with this exception.
+    Refused(&'static str, u8),
+    /// It has rejected the image.
+    Rejected(Reason),
+    /// Its answers are not those of an update.
+    Strange,
+    /// It has taken no block in many rounds.
+    NoProgress,
+    /// It has restarted again and again.
+    Restarts,
+    /// It has not started the image.
+    NotStarted,
+    /// It runs an image that is not the one that was sent.
+    OtherImage,
+    /// It has not confirmed the image.
+    NotConfirmed,
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Silent => {
+                "does not answer any more: check power and wiring, then run the same command again"
+            }
+            Self::Refused(what, code) => {
+                let name = names::exception(*code).unwrap_or("unknown exception");
+                let advice = match code {
+                    6 => {
+                        "another command may be under way, or there were too many saves: wait a minute and run the same command again; over the air LORA must be 1"
+                    }
+                    _ => "its firmware may not fit this program",
+                };
+                return write!(
+                    f,
+                    "refuses {what} with exception {code:02X} ({name}): {advice}"
+                );
+            }
+            Self::Rejected(reason) => {
+                return write!(
+                    f,
+                    "rejected the image ({}), and runs the one that it had",
+                    said(*reason)
+                );
+            }
+            Self::Strange => {
+                "answers what this program does not understand: a newer modioctl may be needed"
+            }
+            Self::NoProgress => {
+                "takes no more blocks: the line may be disturbed (try --unicast), or its flash may be worn"
+            }
+            Self::Restarts => {
+                "restarts during the update: check its supply, then run the same command again"
+            }
+            Self::NotStarted => {
+                "has not started the image, and runs the one that it had: run the same command again"
+            }
+            Self::OtherImage => {
+                "runs an image that was not sent: another program may update it; see `modioctl update --status`"
+            }
+            Self::NotConfirmed => {
+                "runs the image, but has not confirmed it: run the same command again within 15 minutes"
+            }
+        })
+    }
+}
+
+/// Describes why an image was rejected.
+pub fn said(reason: Reason) -> &'static str {
+    match reason {
+        Reason::Magic => "it has no header",
+        Reason::Board => "it is for another board",
+        Reason::Address => "it is for the other slot",
+        Reason::Length => "its length is wrong",
+        Reason::Epoch => "its security epoch is too old",
+        Reason::Crc => "its CRC-32 is wrong",
+        Reason::Hash => "its hash is wrong",
+        Reason::Signature => "its signature is not by a key of the unit's loader",
+        Reason::Interrupted => "its check was interrupted",
+        Reason::NotConfirmed => "it was started twice and not confirmed",
+    }
+}

@@ -1,0 +1,225 @@
+//! The file of an update: the images for both slots of a board, and the manifest after them.
+
+use std::fmt;
+use std::path::Path;
+
+use register_map::Board;
+use register_map::update::{BLOCK_BYTES, Header, Slot, crc32, intact};
+use sha2::{Digest as _, Sha512};
+
+use crate::failure::Failure;
+
+/// First bytes of the manifest: magic and format.
+const MAGIC: [u8; 8] = *b"MODM\x01\0\0\0";
+/// Position of the hash in the manifest. Offset and length of each image are between the magic and the hash.
+const HASH: usize = 24;
+/// Position of the CRC-32 in the manifest.
+const CRC: usize = BLOCK_BYTES - 4;
+
+/// The largest file that is read. Two slots of the largest part have less than a quarter of it.
+const MOST: u64 = 1 << 20;
+
+/// The image for one slot.
+#[derive(Clone, Debug)]
+pub struct Image {
+    /// The slot.
+    pub slot: Slot,
+    /// What file 2 reports of this image: version, patch level, epoch, commit (2), blocks, key (2).
+    pub words: [u16; 8],
+    /// Its blocks, the last one filled with FF.
+    pub blocks: Vec<[u8; BLOCK_BYTES]>,
+}
+
+/// The images of a board for both slots.
+#[derive(Clone, Debug)]
+pub struct File {
+    /// The board.
+    pub board: &'static Board,
+    /// The images for slots A and B.
+    pub images: [Image; 2],
+}
+
+/// Version, epoch and commit in the words of an image that file 2 reports, for people.
+#[derive(Clone, Copy, Debug)]
+pub struct Version<'a>(pub &'a [u16; 8]);
+
+impl fmt::Display for Version<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [version, patch, epoch, high, low, ..] = *self.0;
+        let [major, minor] = version.to_be_bytes();
+        write!(f, "{major}.{minor}.{patch} ({high:04x}{low:04x})")?;
+        if epoch > 0 {
+            write!(f, " epoch {epoch}")?;
+        }
+        Ok(())
+    }
+}
+
+impl Image {
+    /// Returns the security epoch.
+    #[must_use]
+    pub const fn epoch(&self) -> u16 {
+        self.words[2]
+    }
+}
+
+impl File {
+    /// Reads and checks a file.
+    ///
+    /// # Errors
+    ///
+    /// In one line, what is wrong with the file.
+    pub fn read(path: &Path) -> Result<Self, Failure> {
+        let wrong = |what: &dyn fmt::Display| Failure::usage(format!("{}: {what}", path.display()));
+        let length = std::fs::metadata(path)
+            .map_err(|error| wrong(&error))?
+            .len();
+        if length > MOST {
+            return Err(wrong(&"too long for an update: a .modio file is needed"));
+        }
+        let bytes = std::fs::read(path).map_err(|error| wrong(&error))?;
+        Self::of(&bytes).map_err(|what| wrong(&what))
+    }
+
+    /// Checks the bytes of a file.
+    ///
+    /// # Errors
+    ///
+    /// What is wrong with them.
+    pub fn of(bytes: &[u8]) -> Result<Self, String> {
+        let (body, manifest) = bytes
+            .split_last_chunk::<BLOCK_BYTES>()
+            .filter(|(_, manifest)| manifest.starts_with(&MAGIC))
+            .ok_or("not the file of an update, or cut short: a .modio file is needed")?;
+        let number = |at: usize| {
+            let bytes = manifest.get(at..).and_then(|rest| rest.first_chunk());
+            u32::from_le_bytes(bytes.copied().unwrap_or_default())
+        };
+        if number(CRC) != crc32([&manifest[..CRC], &[]])
+            || Sha512::digest(body)[..] != manifest[HASH..HASH + 64]
+        {
+            return Err("the file is damaged: copy it again".to_owned());
+        }
+        let part = |at: usize| {
+            let first = number(at) as usize;
+            body.get(first..)?.get(..number(at + 4) as usize)
+        };
+        let [a, b] = [8, 16].map(|at| part(at).ok_or("the manifest names no image in the file"));
+        let (board, a) = image(a?, Slot::A)?;
+        let (other, b) = image(b?, Slot::B)?;
+        if board != other || a.words[..5] != b.words[..5] {
+            return Err("the two images are not of one board and one version".to_owned());
+        }
+        let images = [a, b];
+        Ok(Self { board, images })
+    }
+
+    /// Returns the image for a slot.
+    #[must_use]
+    pub const fn image(&self, slot: Slot) -> &Image {
+        match slot {
+            Slot::A => &self.images[0],
+            Slot::B => &self.images[1],
+        }
+    }
+}
+
+/// Checks the image for a slot. Returns its board as well.
+fn image(bytes: &[u8], slot: Slot) -> Result<(&'static Board, Image), String> {
+    let wrong = |what: &str| format!("the image for slot {slot:?} {what}");
+    let header = Header::of(bytes).map_err(|_| wrong("has no header"))?;
+    let code = header.board();
+    let board = Board::from_code(code.into()).ok_or_else(|| {
+        wrong(&format!(
+            "is for board {code}, which this program does not know"
+        ))
+    })?;
+    let layout = board.layout();
+    let address = layout.slots[slot as usize];
+    header.suits(code, address).map_err(|_| {
+        wrong(&format!(
+            "is linked for {:#010x}, not for {address:#010x}",
+            header.address()
+        ))
+    })?;
+    header
+        .blocks(layout.slot as usize)
+        .map_err(|_| wrong(&format!("does not fit a slot of the {board}")))?;
+    intact(bytes, crc32).map_err(|_| wrong("is cut short, or its CRC-32 is wrong"))?;
+    let blocks = bytes.chunks(BLOCK_BYTES).map(|chunk| {
+        let mut block = [0xFF; BLOCK_BYTES];
+        block[..chunk.len()].copy_from_slice(chunk);
+        block
+    });
+    let blocks: Vec<_> = blocks.collect();
+    let words = header.words();
+    Ok((
+        board,
+        Image {
+            slot,
+            words,
+            blocks,
+        },
+    ))
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::super::sample::{file, image, sealed};
+    use super::*;
+
+    /// Returns the file of a modio-02 whose images have this number of blocks.
+    pub fn of_blocks(blocks: usize) -> File {
+        let length = blocks * BLOCK_BYTES - 512;
+        File::of(&file(Slot::ALL.map(|slot| image(slot, length)))).unwrap()
+    }
+
+    #[test]
+    fn a_right_file_has_both_images_in_blocks() {
+        let [a, b] = [image(Slot::A, 1004), image(Slot::B, 2048)];
+        let read = File::of(&file([a.clone(), b])).unwrap();
+        assert_eq!(read.board.name, "modio-02");
+        assert_eq!(read.image(Slot::B).blocks.len(), 20);
+        let first = read.image(Slot::A);
+        assert_eq!(first.blocks.len(), 12, "1516 bytes");
+        assert_eq!(first.blocks.as_flattened()[..1516], a);
+        assert_eq!(first.blocks.as_flattened()[1516..], [0xFF; 20]);
+        assert_eq!(first.words, [3, 1, 0, 0x1A2B, 0x3C4D, 12, 0, 0]);
+        assert_eq!(Version(&first.words).to_string(), "0.3.1 (1a2b3c4d)");
+    }
+
+    #[test]
+    fn a_wrong_file_is_refused_with_the_reason() {
+        let both = || [image(Slot::A, 1000), image(Slot::B, 1000)];
+        let right = file(both());
+        let refused = |bytes: &[u8]| File::of(bytes).unwrap_err();
+        assert!(refused(&[]).contains("not the file of an update"));
+        assert!(refused(&right[1..right.len() - 1]).contains("cut short"));
+        for at in (0..right.len()).step_by(61) {
+            let mut damaged = right.clone();
+            damaged[at] ^= 0x10;
+            refused(&damaged);
+        }
+        let [a, b] = both();
+        assert!(refused(&file([b.clone(), b.clone()])).contains("is linked for 0x08011800"));
+        let changed = |at: usize, byte: u8| {
+            let mut image = b.clone();
+            image[at] = byte;
+            refused(&file([a.clone(), sealed(image)]))
+        };
+        assert!(changed(5, 9).contains("is for board 9, which"));
+        assert!(changed(8, 1).contains("not of one board and one version"));
+        let mut unsealed = b.clone();
+        unsealed[600] ^= 1;
+        assert!(refused(&file([a.clone(), unsealed])).contains("CRC-32"));
+        let long = image(Slot::B, 54 * 1024);
+        assert!(refused(&file([a, long])).contains("does not fit a slot"));
+    }
+
+    #[test]
+    fn a_missing_file_is_named() {
+        let failure = File::read(Path::new("/nowhere/a.modio")).unwrap_err();
+        assert_eq!(failure.status(), 2);
+        assert!(failure.to_string().starts_with("/nowhere/a.modio: "));
+    }
+}

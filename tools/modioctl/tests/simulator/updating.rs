@@ -1,0 +1,246 @@
+//! `update`, with units that the test serves.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use modioctl::bus::adu::Framing;
+use modioctl::update::File;
+use register_map::Module;
+use register_map::state::{FIRMWARE_VERSION, UPDATE};
+use register_map::update::{Slot, State};
+
+use crate::program::{At, has};
+use crate::served::{modio_02, response, serve_requests, server};
+
+#[allow(dead_code, reason = "the tests of the plan use the rest")]
+#[path = "../../src/update/model.rs"]
+mod model;
+#[allow(dead_code, reason = "the tests of the file use the rest")]
+#[path = "../../src/update/sample.rs"]
+mod sample;
+
+use model::{Flaw, Model};
+
+/// Blocks of the image.
+const BLOCKS: usize = 100;
+
+/// A line with units, which share the registers that an update does not use.
+struct Line {
+    units: Arc<Mutex<Vec<Model>>>,
+    /// PDUs of all requests that write.
+    written: Arc<Mutex<Vec<Vec<u8>>>>,
+    at: At,
+    folder: tempfile::TempDir,
+}
+
+impl Line {
+    /// Serves units 1 to `count`, after a change of each.
+    fn new(count: u8, change: impl FnMut(&mut Model)) -> Self {
+        let mut units: Vec<_> = (1..=count).map(Model::new).collect();
+        for unit in &mut units {
+            unit.page = Duration::from_millis(2);
+            unit.restart = Duration::from_millis(400);
+        }
+        units.iter_mut().for_each(change);
+        let units = Arc::new(Mutex::new(units));
+        let written = Arc::default();
+        let at = At::tcp(serve(&units, &written));
+        let folder = tempfile::tempdir().unwrap();
+        Self {
+            units,
+            written,
+            at,
+            folder,
+        }
+    }
+
+    /// Returns the path of a file for a modio-02.
+    fn file(&self) -> PathBuf {
+        let path = self.folder.path().join("modio-02.modio");
+        let images = Slot::ALL.map(|slot| sample::image(slot, BLOCKS * 128 - 512));
+        std::fs::write(&path, sample::file(images)).unwrap();
+        path
+    }
+
+    fn words(&self, words: &str) -> String {
+        let file = self.file();
+        format!("--baud 921600 --timeout 200ms {words}").replace("FILE", file.to_str().unwrap())
+    }
+
+    fn run(&self, words: &str) -> crate::program::Ran {
+        self.at.run(&self.words(words))
+    }
+
+    fn blocks(&self) -> usize {
+        let written = self.written.lock().unwrap();
+        written.iter().filter(|pdu| pdu.len() > 100).count()
+    }
+}
+
+fn serve(units: &Arc<Mutex<Vec<Model>>>, written: &Arc<Mutex<Vec<Vec<u8>>>>) -> SocketAddr {
+    let (units, written) = (Arc::clone(units), Arc::clone(written));
+    let begin = Instant::now();
+    let mut server = server(modio_02(Module::Di4));
+    serve_requests(move |unit, pdu| {
+        if matches!(pdu[0], 6 | 0x15) {
+            written.lock().unwrap().push(pdu.to_vec());
+        }
+        let mut units = units.lock().unwrap();
+        let first = u16::from_be_bytes([pdu[1], pdu[2]]);
+        let is_points =
+            pdu[0] == 1 || (pdu[0] == 3 && ![FIRMWARE_VERSION, UPDATE].contains(&first));
+        if is_points && units.iter().any(|known| known.address == unit) {
+            return Some(response(&mut server, unit, pdu));
+        }
+        let answers = units
+            .iter_mut()
+            .filter_map(|known| known.take(unit, pdu, begin.elapsed()));
+        // All units take a broadcast.
+        let answer = answers.collect::<Vec<_>>().pop();
+        Some(answer.map_or(Vec::new(), |pdu| Framing::Rtu.frame(0, unit, &pdu)))
+    })
+}
+
+#[test]
+fn units_are_updated_together_and_again_only_when_it_is_forced() {
+    let line = Line::new(3, |_| ());
+    let text = line.run("update FILE --units 1-3").fine();
+    let done = "0.1.2 (00030004) -> 0.3.1 (1a2b3c4d) in slot B, confirmed";
+    has(
+        &text,
+        &[&format!("unit 3: {done}"), "for 100 of the image:"],
+    );
+    let sent = line.blocks();
+    assert!((BLOCKS..BLOCKS + 60).contains(&sent), "{sent}");
+    let file = File::read(&line.file()).unwrap();
+    for unit in line.units.lock().unwrap().iter() {
+        let content: Vec<_> = unit.content.iter().map(|block| block.unwrap()).collect();
+        assert_eq!(content, file.image(Slot::B).blocks);
+        assert!(!unit.trial);
+    }
+    let text = line.run("update FILE --units 1-3").fine();
+    let again = "unit 2: 0.3.1 (1a2b3c4d) in slot B, it runs that already";
+    has(&text, &[again]);
+    assert_eq!(line.blocks(), sent);
+    let text = line
+        .run("--json update FILE --unit 2 --force --unicast")
+        .fine();
+    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(json["units"][0]["slot"], "A");
+    assert_eq!(json["units"][0]["result"], "confirmed");
+    assert!(json["seconds"]["blocks"].as_f64().unwrap() > 0.1, "{json}");
+}
+
+#[test]
+fn nothing_is_sent_unless_the_file_suits_every_unit() {
+    let line = Line::new(3, |unit| {
+        unit.floor = u16::from(unit.address == 2);
+        unit.trial = unit.address == 3;
+    });
+    let text = line.run("update FILE --units 1-3").failed(2);
+    has(&text, &["nothing was sent: ", "unit 2 takes only firmware"]);
+    has(&text, &["; unit 3 runs 0.1.2 (00030004) on trial: "]);
+    let text = line.run("--retries 0 update FILE --units 1,9").failed(3);
+    has(&text, &["nothing was sent: unit 9 does not answer"]);
+    let text = line.run("update /nowhere.modio").failed(2);
+    has(&text, &["/nowhere.modio: "]);
+    line.run("update FILE --unit 1 --poll nonsense").failed(2);
+    line.run("update").failed(2);
+    line.run("update --status FILE").failed(2);
+    assert_eq!(line.written.lock().unwrap().len(), 0);
+}
+
+#[test]
+fn a_unit_without_a_loader_cannot_be_updated() {
+    let mut server = server(modio_02(Module::Di4));
+    server.device.lacks.push(0x14);
+    let address = serve_requests(move |unit, pdu| Some(response(&mut server, unit, pdu)));
+    let line = Line::new(0, |_| ());
+    let at = At::tcp(address);
+    for words in ["update FILE", "update --back"] {
+        let text = at.run(&line.words(words)).failed(2);
+        has(
+            &text,
+            &["unit 1 has no loader, so it cannot be updated over the line"],
+        );
+    }
+}
+
+#[test]
+fn after_ctrl_c_the_same_command_sends_what_is_missing() {
+    let line = Line::new(2, |_| ());
+    let words = line.words("update FILE --units 1-2 --unicast --poll p5.1");
+    let mut running = line.at.start(&words);
+    running.out.wait_for("p5.1 off");
+    while line.blocks() < 50 {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    running.interrupt();
+    let ran = running.end();
+    assert_eq!(ran.status, 130, "{ran:?}");
+    has(&ran.err, &["the same command goes on where it stopped"]);
+    let sent = line.blocks();
+    let text = line.run("update FILE --units 1-2").fine();
+    has(&text, &["unit 1: 0.1.2", "unit 2: 0.1.2"]);
+    // Unit 2 had no block.
+    let more = line.blocks() - sent;
+    assert!(more < BLOCKS + 60, "{more} after {sent}");
+}
+
+#[test]
+fn a_unit_that_drops_out_is_reported_and_the_others_go_on() {
+    let line = Line::new(3, |unit| match unit.address {
+        2 => unit.flaw = Flaw::GoneAfter(60),
+        3 => unit.flaw = Flaw::Rejects(register_map::update::Reason::Signature),
+        _ => (),
+    });
+    let ran = line.run("--retries 0 update FILE --units 1-3");
+    assert_eq!(ran.status, 1, "{ran:?}");
+    has(
+        &ran.out,
+        &[
+            "unit 1: 0.1.2 (00030004) -> ",
+            "unit 2: 0.1.2 (00030004), not updated to ",
+        ],
+    );
+    has(
+        &ran.err,
+        &["modioctl: unit 2 does not answer any more: check power"],
+    );
+    has(
+        &ran.err,
+        &["modioctl: unit 3 rejected the image (its signature is not by a key"],
+    );
+    assert_eq!(ran.err.lines().count(), 2, "{ran:?}");
+}
+
+#[test]
+fn status_shows_both_slots_and_the_way_back_exchanges_them() {
+    let line = Line::new(2, |unit| {
+        if unit.address == 1 {
+            unit.state = State::Confirmed;
+            unit.images[1] = [0x0100, 7, 0, 0xAAAA, 0xBBBB, 20, 0, 0];
+        }
+    });
+    let text = line.run("update --status --units 1-2").fine();
+    has(
+        &text,
+        &["modio-02  A     0.1.2 (00030004)  confirmed  1.0.7 (aaaabbbb), confirmed"],
+    );
+    let json: serde_json::Value =
+        serde_json::from_str(&line.run("--json update --status --units 1-2").fine()).unwrap();
+    assert_eq!(json[1]["other"], "empty");
+    let text = line.run("update --back --units 1-2").failed(2);
+    has(
+        &text,
+        &["nothing was sent: unit 2 has nothing to go back to"],
+    );
+    let text = line.run("update --back").fine();
+    has(
+        &text,
+        &["unit 1: 0.1.2 (00030004) -> 1.0.7 (aaaabbbb) in slot B, confirmed"],
+    );
+    assert_eq!(line.blocks(), 0);
+}
