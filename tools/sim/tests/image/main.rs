@@ -16,7 +16,7 @@
 //! | configuration | `in_force`, `storing`, `saving`, `save_budget`, `flash_faults`, `power_cut` |
 //! | the simulator | `cores`: boards of one process share translated code; `programmed`: loader and image in its flash |
 //! | the radio | `radio`, `air` |
-//! | the loader, and an update over the line | `loading`, `updating` |
+//! | the loader, and an update over the line | `loading`, `updating`, `campaign` |
 //! | safety | `boot`, `clock`, `outputs_at_start`, `comm_watchdog`, `hung_task`, `faults`, `upsets`, `kept`, `stack`, `log`, `long_run` |
 
 use sim::board::{Layout, MODIO_02};
@@ -32,6 +32,7 @@ mod analog_outputs;
 mod bench;
 mod boot;
 mod bus;
+mod campaign;
 mod clock;
 mod comm_watchdog;
 mod cores;
