@@ -9,8 +9,9 @@ use register_map::update::{BLOCK_BYTES, Slot};
 use sim::line::Settings;
 use sim::{Board, Bus, Module, Time};
 
+use crate::FILES;
 use crate::bench::{FIRST, adu, path};
-use crate::slots::{CHECK, START, flash, image, made};
+use crate::in_slots::{CHECK, START, flash, image, made};
 
 /// A line with boards that run from slot A.
 struct Line {
@@ -169,7 +170,7 @@ impl Line {
 
     /// Updates all units. Returns the time of the blocks as a multiple of that of the image's bytes.
     fn update(&mut self) -> f64 {
-        let file = std::fs::read(path("MODIO_A").with_file_name("modio-02.modio"));
+        let file = std::fs::read(path(FILES[3]));
         let file = File::of(&file.expect("the file of the update")).expect("it is whole");
         let image = file.image(Slot::B);
         let units =

@@ -25,6 +25,8 @@ use sim::board::{Layout, MODIO_02};
 const LAYOUT: &Layout = &MODIO_02;
 /// The variable that names the image.
 const ELF: &str = "MODIO_ELF";
+/// Those of the loader, of the signed images for slots A and B, and of the file of an update.
+const FILES: [&str; 4] = ["MODIO_LOADER", "MODIO_A", "MODIO_B", "MODIO_UPDATE"];
 
 mod air;
 mod analog_inputs;
@@ -43,6 +45,7 @@ mod faults;
 mod flash_faults;
 mod hung_task;
 mod in_force;
+mod in_slots;
 mod kept;
 mod loading;
 mod log;
@@ -59,7 +62,6 @@ mod save_budget;
 mod saving;
 mod self_description;
 mod silences;
-mod slots;
 mod stack;
 mod storing;
 mod timing;

@@ -9,7 +9,7 @@ use sha2::{Digest as _, Sha512};
 use sim::{Board, Config, Image, Module, Time, chip};
 
 use crate::{
-    LAYOUT,
+    FILES, LAYOUT,
     bench::{Bench, PAGE_SIZE, PORT, corner, flash_with_settings, pages, path},
 };
 
@@ -29,10 +29,11 @@ pub const CHECK: Time = Time::from_ms(4_000);
 
 /// The loader, and the images for slots A and B.
 static BUILT: LazyLock<(Image, [Vec<u8>; 2])> = LazyLock::new(|| {
-    let image = |name| fs::read(path(name)).expect("the image can be read");
+    let [loader, a, b, _] = FILES.map(path);
+    let image = |file| fs::read(file).expect("the image can be read");
     (
-        Image::read(&path("MODIO_LOADER")).expect("the loader can be read"),
-        [image("MODIO_A"), image("MODIO_B")],
+        Image::read(&loader).expect("the loader can be read"),
+        [image(a), image(b)],
     )
 });
 
