@@ -9,7 +9,7 @@ use register_map::board::{MODIO_02, MODIO_08};
 
 use crate::error::missing;
 use crate::workspace::Workspace;
-use crate::{build, command, ordinary};
+use crate::{build, command, ordinary, signed};
 
 /// The file that pins pymodbus and its serial port.
 pub const PYMODBUS: &str = "tools/sim/tests/pymodbus/requirements.txt";
@@ -64,7 +64,16 @@ pub fn python(interpreter: &Path) -> Command {
 /// others must pass.
 pub fn masters(workspace: &mut Workspace) -> Result<()> {
     let python = environment(workspace, "pymodbus", &[PYMODBUS])?;
-    command::run(&mut script(workspace, &python, RUN)?)?;
+    let loader = build::loader(workspace, &MODIO_02)?;
+    let (_, update) = signed::update(workspace, &signed::Options::of(&MODIO_02))?;
+    let mut script = script(workspace, &python, RUN)?;
+    command::run(
+        script
+            .arg("--loader")
+            .arg(loader)
+            .arg("--update")
+            .arg(update),
+    )?;
     ensure!(
         which::which("mbpoll").is_ok(),
         missing("passed with pymodbus, but mbpoll was not run (on Debian: apt-get install mbpoll)")

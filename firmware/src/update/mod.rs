@@ -438,7 +438,11 @@ impl Update {
                 self.switched = false;
                 After::Confirmed
             }
-            Some(Order::Finish | Order::GoBack) => After::Restart,
+            Some(Order::Finish | Order::GoBack) => {
+                // Nothing changes the image any more before the restart.
+                self.running.prepared = false;
+                After::Restart
+            }
             None => After::Nothing,
         }
     }

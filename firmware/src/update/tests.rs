@@ -205,6 +205,7 @@ fn whole_image_becomes_new_and_the_device_restarts() {
     assert_eq!(unit.update.record(16 + 5), 20, "blocks of the other image");
     unit.order(Order::Finish);
     assert_eq!(unit.after, After::Restart);
+    assert_eq!(unit.send(1, &image[128..256]), BUSY, "it is checked");
     let states: Vec<_> = unit.written.iter().map(|record| record.states[1]).collect();
     assert_eq!(states, [State::Receiving, State::New]);
 }

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use register_map::codes::{Baud, Command};
 use register_map::configuration::{BAUD, COMM_TIMEOUT, COMMAND, KEY, OPENING_KEY};
-use register_map::state::UPDATE;
+use register_map::state::{STACK_FREE, UPDATE};
 use register_map::update::{BLOCK_BYTES, Slot, place_of, status};
 use sim::line::{Format, Settings};
 use sim::{Module, Time};
@@ -154,7 +154,12 @@ fn after(bench: &mut Bench) -> (usize, Status) {
 fn the_new_image_starts_and_serves_and_stays_once_it_is_confirmed() {
     let mut bench = running();
     assert_eq!(bench.update_status().slot, 1);
-    bench.update(&image(1));
+    bench.prepare();
+    bench.send(Slot::B, &image(1));
+    bench.board.run_for(ERASE);
+    let free = bench.register(STACK_FREE);
+    assert!(free >= 1024, "{free} bytes of stack");
+    assert_eq!(bench.order(Command::Finish), Ok(()));
     let from = bench.board.now();
     let (slot, _) = after(&mut bench);
     println!("out of service for {:?}", bench.board.now() - from);

@@ -27,12 +27,15 @@ def main() -> int:
     parser.add_argument("--sim", required=True, type=pathlib.Path, help="the program modio-sim")
     parser.add_argument("--elf", required=True, type=pathlib.Path, help="the image of the modio-02")
     parser.add_argument("--elf-08", type=pathlib.Path, help="the image of the modio-08")
+    parser.add_argument("--loader", type=pathlib.Path, help="the loader of the modio-02")
+    parser.add_argument("--update", type=pathlib.Path, help="the file of an update of the modio-02")
     parser.add_argument("--tests", type=pathlib.Path, help="the tests of this directory instead")
     parser.add_argument("--only", type=pathlib.Path, metavar="FILE", help="the tests of one file")
     options = parser.parse_args()
     # The tests and the client read these variables.
     for variable, file in (
-            ("MODIO_SIM", options.sim), ("MODIO_ELF", options.elf), ("MODIO_ELF_08", options.elf_08)):
+            ("MODIO_SIM", options.sim), ("MODIO_ELF", options.elf), ("MODIO_ELF_08", options.elf_08),
+            ("MODIO_LOADER", options.loader), ("MODIO_UPDATE", options.update)):
         if file is None:
             continue
         if not file.is_file():

@@ -1,4 +1,4 @@
-"""Runs the example of docs/simulator-http.md and compares its output with the page."""
+"""Runs the example of docs/simulator-http.md and compares its output with the page, and the one of docs/update.md."""
 
 import os
 import pathlib
@@ -9,6 +9,7 @@ import tempfile
 import unittest
 
 import modio_sim
+from simulator import Simulator
 
 ROOT = pathlib.Path(__file__).resolve().parents[4]
 
@@ -27,3 +28,26 @@ class Example(unittest.TestCase):
                 [sys.executable, "-B", "-"], input=program, capture_output=True, text=True, timeout=120,
                 env={**os.environ, "MODIO_SIM": str(simulator), "PYTHONPATH": client})
         self.assertEqual((run.stdout, run.stderr), (printed, ""))
+
+
+class Update(unittest.TestCase):
+    def test_the_script_of_the_page_about_updates_updates_a_unit(self):
+        text = (ROOT / "docs/update.md").read_text()
+        [program] = [part for part in re.findall(r"```python\n(.+?)```", text, re.DOTALL) if "pymodbus" in part]
+        self.assertLessEqual(program.count("\n"), 40)
+        loader, image = os.environ["MODIO_LOADER"], os.environ["MODIO_UPDATE"]
+        simulator = Simulator.start(options=["--loader", loader, "--image", image])
+        self.addCleanup(simulator.end_well)
+        # At 9600 bit/s the update takes minutes.
+        master = simulator.master()
+        for address, value in ((0x0100, 0x5A17), (0x0101, 1152), (0x0108, 1), (0x0108, 2)):
+            self.assertFalse(master.write_register(address, value).isError())
+        master.close()
+        simulator.wait(500)
+        self.assertIn("baudrate=9600", program)
+        program = program.replace("9600", "115200")
+        run = subprocess.run(
+            [sys.executable, "-B", "-", simulator.pty, "1", image], input=program, capture_output=True, text=True,
+            timeout=300)
+        self.assertEqual((run.stdout, run.stderr), ("updated\n", ""))
+        self.assertEqual(simulator.state().line.baud, 115200)
