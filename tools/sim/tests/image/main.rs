@@ -61,5 +61,6 @@ mod slots;
 mod stack;
 mod storing;
 mod timing;
+mod update_of_a_bus;
 mod updating;
 mod upsets;
