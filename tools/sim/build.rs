@@ -1,6 +1,6 @@
-//! Puts firmware images into the program, so that it runs without an image file. The images are all files `BOARD.elf`
-//! in the directory that the variable `MODIO_SIM_IMAGES` names. `cargo xtask dist` sets the variable. Without it, the
-//! program has no images.
+//! Puts loaders and images into the program, so that it runs without other files. They are all files in the directory
+//! that the variable `MODIO_SIM_IMAGES` names. `cargo xtask dist` sets the variable. Without it, the program has no
+//! images.
 
 use std::env;
 use std::fmt::Write as _;
@@ -21,26 +21,24 @@ fn main() {
         );
         for (name, file) in images(Path::new(&directory)) {
             // Copy the image beside the code that includes it, so that the program contains no path of this computer.
-            let copy = format!("{name}.elf");
-            fs::copy(&file, out.join(&copy)).expect("OUT_DIR must be writable");
+            fs::copy(&file, out.join(&name)).expect("OUT_DIR must be writable");
             writeln!(
                 rows,
-                "    ({name:?}, include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{copy}\"))),"
+                "    ({name:?}, include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{name}\"))),"
             )
             .expect("writing to a String cannot fail");
         }
     }
-    fs::write(out.join("images.rs"), format!("&[\n{rows}]\n")).expect("OUT_DIR must be writable");
+    fs::write(out.join("files.rs"), format!("&[\n{rows}]\n")).expect("OUT_DIR must be writable");
 }
 
-/// Returns the images in a directory, sorted by name.
+/// Returns the files in a directory, sorted by name.
 fn images(directory: &Path) -> Vec<(String, PathBuf)> {
     let files = fs::read_dir(directory)
         .unwrap_or_else(|error| panic!("{VARIABLE}: {}: {error}", directory.display()));
     let mut found: Vec<(String, PathBuf)> = files
         .map(|file| file.expect("the directory must be readable").path())
-        .filter(|file| file.extension().is_some_and(|extension| extension == "elf"))
-        .filter_map(|file| Some((file.file_stem()?.to_str()?.to_owned(), file.clone())))
+        .filter_map(|file| Some((file.file_name()?.to_str()?.to_owned(), file)))
         .collect();
     found.sort();
     assert!(

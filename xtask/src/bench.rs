@@ -8,8 +8,8 @@ use std::process::Command;
 
 use anyhow::{Context as _, Result, ensure};
 use fs_err as fs;
-use register_map::Board;
 use register_map::layout::HEADER;
+use register_map::{Board, update::Slot};
 use serde_json::{Value, json};
 
 use crate::workspace::{self, Workspace};
@@ -68,13 +68,13 @@ pub fn check(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
 
 fn measure(workspace: &mut Workspace, board: &'static Board) -> Result<Value> {
     let loader = build::loader(workspace, board)?;
-    let slots = signed::images(workspace, &signed::Options::of(board))?;
+    let image = signed::image(workspace, &signed::Options::of(board), Slot::A)?;
     let elf = build::image(workspace, board)?;
     let mut build = rivals(workspace, "build")?;
     let rivals = workspace::artifacts(build.arg("--quiet"))?;
     let mut program = Command::new(workspace.program("modio-bench")?);
     program.arg(&elf).args(["--board", board.name, "--loader"]);
-    program.arg(&loader).arg("--signed").arg(&slots[0]);
+    program.arg(&loader).arg("--signed").arg(&image);
     program.arg("--rivals");
     for name in RIVALS {
         program.arg(workspace::executable(&rivals, name)?);
@@ -83,7 +83,7 @@ fn measure(workspace: &mut Workspace, board: &'static Board) -> Result<Value> {
     let mut report: Value = report.context("the report of tools/bench is broken")?;
     report["image"] = size::report(&elf)?;
     report["loader"] = size::report(&loader)?;
-    let application = fs::metadata(&slots[0])?.len() - u64::from(HEADER);
+    let application = fs::metadata(&image)?.len() - u64::from(HEADER);
     report["slot"] = json!({ "flash": application, "budget": board.memory().budget[0] });
     server::add(&mut report, &image::parse(&image::read(&elf)?)?)?;
     Ok(report)

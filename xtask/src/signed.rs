@@ -52,32 +52,36 @@ impl Options {
 
 /// `cargo xtask image`.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
-    let board = options.build.board;
-    let images = images(workspace, options)?;
-    let images: Vec<Vec<u8>> = images.iter().map(fs::read).collect::<Result<_, _>>()?;
-    let beside = build::target(&workspace.target, board).join(format!("{board}.modio"));
-    let output = options.output.clone().unwrap_or(beside);
-    fs::write(&output, file(&images))?;
-    say!("{}", output.display());
+    let (_, file) = update(workspace, options)?;
+    say!("{}", file.display());
     Ok(())
 }
 
-/// Builds the images for both slots, signs them, and returns their files, A first.
-pub fn images(workspace: &mut Workspace, options: &Options) -> Result<Vec<PathBuf>> {
+/// Builds and signs the images for both slots, and makes the file of an update. Returns the files of the images, A
+/// first, and that file.
+pub fn update(workspace: &mut Workspace, options: &Options) -> Result<([PathBuf; 2], PathBuf)> {
+    let mut image = |slot| image(workspace, options, slot);
+    let slots = [image(Slot::A)?, image(Slot::B)?];
+    let [a, b] = &slots;
+    let board = options.build.board;
+    let beside = || a.with_file_name(format!("{board}.modio"));
+    let output = options.output.clone().unwrap_or_else(beside);
+    fs::write(&output, file(&[fs::read(a)?, fs::read(b)?]))?;
+    Ok((slots, output))
+}
+
+/// Builds the image for a slot, signs it, and returns its file.
+pub fn image(workspace: &mut Workspace, options: &Options, slot: Slot) -> Result<PathBuf> {
     let board = options.build.board;
     let path = options.key.clone();
     let path = path.unwrap_or_else(|| workspace.root.join(DEVELOPMENT));
     let key = key(&fs::read_to_string(&path).map_err(|error| usage(error.to_string()))?)
         .with_context(|| path.display().to_string())?;
-    let mut files = Vec::new();
-    for slot in Slot::ALL {
-        let elf = build::slot(workspace, board, slot)?;
-        let image = of_slot(board, slot, &image::read(&elf)?, &key, options.epoch)?;
-        let file = elf.with_extension("image");
-        fs::write(&file, image)?;
-        files.push(file);
-    }
-    Ok(files)
+    let elf = build::slot(workspace, board, slot)?;
+    let image = of_slot(board, slot, &image::read(&elf)?, &key, options.epoch)?;
+    let file = elf.with_extension("image");
+    fs::write(&file, image)?;
+    Ok(file)
 }
 
 /// Returns the key of a file with 64 hexadecimal digits.

@@ -329,11 +329,17 @@ pub fn simulated(
     variables: &[(&str, &str)],
 ) -> Result<()> {
     let ordinary = ordinary::words()?;
-    let loader = build::loader(workspace, &MODIO_02)?;
-    // First, because the application alone has the same name until it is built again.
-    let slots = signed::images(workspace, &signed::Options::of(&MODIO_02))?;
-    let modio_02 = build::image(workspace, &MODIO_02)?;
-    let modio_08 = build::image(workspace, &MODIO_08)?;
+    let mut files = Vec::new();
+    let updates = |target| ["--test=image", "--test=simulator"].contains(&target);
+    if targets.split(' ').any(updates) {
+        files.push(("MODIO_LOADER", build::loader(workspace, &MODIO_02)?));
+        let options = signed::Options::of(&MODIO_02);
+        let ([a, b], update) = signed::update(workspace, &options)?;
+        files.extend([("MODIO_A", a), ("MODIO_B", b), ("MODIO_UPDATE", update)]);
+    }
+    // Afterwards, because an application for a slot has the same name until it is renamed.
+    files.push(("MODIO_ELF", build::image(workspace, &MODIO_02)?));
+    files.push(("MODIO_ELF_08", build::image(workspace, &MODIO_08)?));
     let simulator = workspace.simulator()?;
     let tests = |list: &[&str]| {
         let mut cargo = workspace.cargo("test");
@@ -346,10 +352,7 @@ pub fn simulated(
         cargo.args(["--", "--include-ignored"]).args(list);
         cargo.args(names.split_whitespace());
         cargo.env(CORNER, "nominal").envs(variables.iter().copied());
-        cargo.env("MODIO_ELF", &modio_02);
-        cargo.env("MODIO_ELF_08", &modio_08);
-        cargo.env("MODIO_LOADER", &loader);
-        cargo.envs(["MODIO_A", "MODIO_B"].into_iter().zip(&slots));
+        cargo.envs(files.iter().map(|(name, file)| (name, file)));
         // Tests of one package do not know the path of another package's program.
         cargo.env("MODIO_SIM", &simulator);
         cargo

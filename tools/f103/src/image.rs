@@ -119,7 +119,7 @@ impl Image {
     /// # Errors
     ///
     /// [`Error::Image`] when it does not fit.
-    pub(crate) fn load(&self, flash: &mut [u8], page: usize) -> Result<(), Error> {
+    pub fn load(&self, flash: &mut [u8], page: usize) -> Result<(), Error> {
         for (offset, data) in &self.segments {
             if offset + data.len() > flash.len() {
                 return Err(does_not_fit(FLASH_BASE + *offset as u32, data.len()));

@@ -1,5 +1,8 @@
 //! The firmware's log: up channel 0 of its RTT control block in SRAM, read as a debug probe reads it.
 //!
+//! The block is found by its ID, because a part may start one of several images. A reset removes the ID: the next image
+//! may have its block at another address, and the old one would be found first.
+//!
 //! ```text
 //! +0   "SEGGER RTT\0..." 16 bytes     +24  up channel 0: name, buffer, size, write offset, read offset, flags
 //! +16  number of up channels                (32-bit words)
@@ -25,8 +28,8 @@ const READ: usize = UP_0 + 16;
 /// The text read so far.
 #[derive(Debug, Default)]
 pub struct Log {
-    /// The control block's offset into SRAM, when the image has one.
-    block: Option<usize>,
+    /// The control block's offset into SRAM, where it was found last.
+    block: usize,
     text: Vec<u8>,
     /// Bytes of the buffer that a caller has been given although they are still in it.
     shown: usize,
@@ -41,26 +44,23 @@ struct Unread {
 }
 
 impl Log {
-    /// Returns a log with a control block at `address`, the image's symbol `_SEGGER_RTT`.
-    #[must_use]
-    pub fn new(address: Option<u32>) -> Self {
-        Self {
-            block: address.map(|address| address.wrapping_sub(RAM_BASE) as usize),
-            ..Self::default()
-        }
-    }
-
     /// Empties the firmware's buffer, as a probe does.
     pub fn poll(&mut self, ram: &mut [u8]) {
         if let Some(unread) = self.unread(ram) {
             let bytes = unread.bytes(ram);
             self.text.extend(bytes.into_iter().skip(self.shown));
-            if let Some(block) = self.block {
-                ram[block + READ..block + READ + 4]
-                    .copy_from_slice(&(unread.write as u32).to_le_bytes());
-            }
+            let at = self.block + READ;
+            ram[at..at + 4].copy_from_slice(&(unread.write as u32).to_le_bytes());
         }
         self.shown = 0;
+    }
+
+    /// Empties the firmware's buffer before a reset of the part.
+    pub fn reset(&mut self, ram: &mut [u8]) {
+        self.poll(ram);
+        if has_id(ram, self.block) {
+            ram[self.block..self.block + ID.len()].fill(0);
+        }
     }
 
     /// Returns everything written since the last call, also what still is in the buffer.
@@ -76,10 +76,13 @@ impl Log {
     }
 
     /// Returns the channel as it stands, if the block has been set up and makes sense.
-    fn unread(&self, ram: &[u8]) -> Option<Unread> {
-        let block = self.block?;
-        let header = ram.get(block..block + READ + 4)?;
-        if !header.starts_with(ID) || word(header, UP_CHANNELS) == 0 {
+    fn unread(&mut self, ram: &[u8]) -> Option<Unread> {
+        if !has_id(ram, self.block) {
+            let mut words = (0..ram.len()).step_by(4);
+            self.block = words.find(|at| has_id(ram, *at))?;
+        }
+        let header = ram.get(self.block..self.block + READ + 4)?;
+        if word(header, UP_CHANNELS) == 0 {
             return None;
         }
         let unread = Unread {
@@ -102,6 +105,10 @@ impl Unread {
             [&buffer[self.read..], &buffer[..self.write]].concat()
         }
     }
+}
+
+fn has_id(ram: &[u8], at: usize) -> bool {
+    ram.get(at..).is_some_and(|block| block.starts_with(ID))
 }
 
 fn word(bytes: &[u8], at: usize) -> u32 {
@@ -130,7 +137,7 @@ mod tests {
 
     #[test]
     fn nothing_is_shown_twice_or_lost_around_the_end_of_the_ring() {
-        let mut log = Log::new(Some(RAM_BASE + 16));
+        let mut log = Log::default();
         let mut memory = ram(2, 6);
         assert_eq!(log.take(&memory), "ghab");
         assert_eq!(log.take(&memory), "");
@@ -142,10 +149,25 @@ mod tests {
     }
 
     #[test]
+    fn after_a_reset_the_block_of_the_next_image_is_found() {
+        let mut log = Log::default();
+        let mut memory = ram(2, 0);
+        log.reset(&mut memory);
+        assert_eq!(log.take(&memory), "ab");
+        memory.copy_within(16..64, 64);
+        memory[64..64 + ID.len()].copy_from_slice(ID);
+        memory[64 + READ] = 0;
+        assert_eq!(log.take(&memory), "ab");
+        log.poll(&mut memory);
+        assert_eq!(memory[64 + READ], 2);
+    }
+
+    #[test]
     fn a_block_that_makes_no_sense_is_left_alone() {
-        let mut log = Log::new(Some(RAM_BASE + 16));
+        let mut log = Log::default();
         assert_eq!(log.take(&ram(9, 0)), "", "offset beyond the buffer");
         assert_eq!(log.take(&[0; 64]), "", "not set up");
-        assert_eq!(Log::new(Some(0)).take(&ram(2, 0)), "", "not in SRAM");
+        let cut = &ram(2, 0)[..16 + READ];
+        assert_eq!(log.take(cut), "", "the end of SRAM is in the block");
     }
 }

@@ -29,10 +29,12 @@ fn main() -> ExitCode {
         Err(error) if error.use_stderr() => return refused(&sim::options::one_line(&error)),
         Err(help) => help.exit(),
     };
-    if options.missing_images {
-        return match options.boards_without_image() {
-            Ok(boards) => {
-                boards.iter().for_each(|board| println!("{board}"));
+    if options.missing_files {
+        return match options.missing_files() {
+            Ok(files) => {
+                for (kind, board) in files {
+                    println!("{kind} {board}");
+                }
                 ExitCode::SUCCESS
             }
             Err(what) => refused(&what),

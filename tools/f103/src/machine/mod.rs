@@ -124,7 +124,6 @@ impl<C: Circuit> Chip<C> {
         image.load(flash.bytes_mut(), part.page_size)?;
         let ident = Ident::new(part, config.unique_id, config.write_protection);
         let mut soc = Soc::new(&config, flash, circuit);
-        let rtt_block = image.symbol("_SEGGER_RTT");
         let Parts {
             core,
             fresh,
@@ -171,8 +170,8 @@ impl<C: Circuit> Chip<C> {
             cut: None,
             cut_at: None,
             resting: Resting::default(),
-            log: Log::new(rtt_block),
-            poll_at: if rtt_block.is_some() { POLL } else { Time::MAX },
+            log: Log::default(),
+            poll_at: POLL,
             active: Active::default(),
             sequential: None,
             unsettled: true,

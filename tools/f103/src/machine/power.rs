@@ -81,7 +81,7 @@ impl<C: Circuit> Chip<C> {
     /// Resets the whole part.
     pub(super) fn reset_by(&mut self, cause: Cause) {
         let now = self.now();
-        self.log.poll(self.bus.ram.bytes_mut());
+        self.log.reset(self.bus.ram.bytes_mut());
         self.bus.soc.reset(cause, now);
         let count = self.core.retired();
         self.counted += count;

@@ -120,6 +120,9 @@ class State:
     """All slots of a board that has several; empty for a board with one."""
     radio: Optional[Radio] = None
     """The LoRa module; None if it is not fitted."""
+    running_slot: Optional[str] = None
+    """Slot of the flash whose image runs, "A" or "B". None without power, in the loader, and for an image that runs
+    without a loader."""
 
     @staticmethod
     def from_json(data: Mapping[str, Any]) -> State:

@@ -1,11 +1,12 @@
 //! Makes the boards that the options name, each with its image, flash and modules.
 
 use std::collections::BTreeMap;
+use std::fs;
 use std::path::Path;
 
 use register_map::{codes::Lora, configuration};
-use sim::board::Layout;
-use sim::options::{Fitting, Options};
+use sim::board::{Firmware, InSlot, Layout};
+use sim::options::{Files, Fitting, Options};
 use sim::radio::Parameters;
 use sim::{Board, Config, Image};
 
@@ -13,59 +14,87 @@ use super::flash_file::FlashFile;
 use super::inside;
 use super::unit::Unit;
 
-/// Makes the boards. A board with a flash file starts with the contents of the file; the image overwrites its own
-/// pages.
+/// What to do without a file to run.
+const NO_FILE: &str = "give a loader and an image with --loader FILE and --image FILE, or an image that runs alone with --elf FILE, or \
+     use `cargo xtask sim`, which builds them";
+
+/// Makes the boards. A board with a flash file starts with the contents of the file, into which the firmware is written
+/// if that is necessary.
 ///
 /// # Errors
 ///
 /// In one line: an image or a file is missing or invalid, or a board does not have a slot that is named.
 pub fn fitted(options: &Options) -> Result<Vec<(Board, Unit)>, String> {
     let fittings = options.fittings()?;
-    let mut images = BTreeMap::new();
+    let mut all = BTreeMap::new();
     let several = fittings.len() > 1;
     let mut boards = Vec::new();
     for (fitting, number) in fittings.into_iter().zip(1..) {
         let name = fitting.board.name;
-        let elf = options.elf_of(fitting.board);
-        let image = match images.get(name) {
-            Some(image) => image,
-            None => {
-                let image = elf.map_or_else(|| inside::image(fitting.board), image)?;
-                images.entry(name).or_insert(image)
-            }
+        let layout = Layout::of(fitting.board).ok_or("the simulator does not know this board")?;
+        let firmware = match all.get(name) {
+            Some(firmware) => firmware,
+            None => all.entry(name).or_insert(firmware(layout, options)?),
         };
-        let (config, flash) = config(&fitting, number, options)?;
-        let board = Board::new(image, config).map_err(|error| {
+        let (image, config, flash) = config(&fitting, number, options, layout, firmware)?;
+        let board = Board::new(&image, config).map_err(|error| {
             let what = match several {
                 true => format!("{}: {error}", fitting.name),
                 false => error.to_string(),
             };
-            match error {
-                sim::Error::Slot(_) => format!("{name}: {what}"),
-                _ => match elf {
-                    Some(elf) => format!("{}: {what}", elf.display()),
-                    None => format!("the image inside: {what}"),
-                },
-            }
+            format!("{name}: {what}")
         })?;
         boards.push((board, Unit::new(fitting.name, flash)));
     }
     Ok(boards)
 }
 
-/// Returns the configuration of board `number` of the line, from 1, and its flash file.
+/// Returns what a type of board runs: the files that the options name, or those inside the program.
+fn firmware(layout: &Layout, options: &Options) -> Result<Firmware, String> {
+    let board = layout.board;
+    let inside =
+        |ending| inside::file(board, ending).ok_or_else(|| format!("no file to run: {NO_FILE}"));
+    let elf = |path: Option<&Path>, ending| match path {
+        Some(path) => Image::read(path).map_err(|error| format!("cannot run the image {error}")),
+        None => {
+            let image = Image::from_elf(&inside(ending)?);
+            image.map_err(|error| format!("cannot run the image inside: {error}"))
+        }
+    };
+    Ok(match options.files_of(board)? {
+        Files::Alone(path) => Firmware::Alone(elf(path, ".elf")?),
+        Files::Loaded { loader, image } => {
+            let (file, name) = match image {
+                Some(path) => (fs::read(path), path.display().to_string()),
+                None => (Ok(inside(".modio")?), "inside".to_owned()),
+            };
+            let image = file.map_err(|error| error.to_string());
+            let image = image.and_then(|file| InSlot::from_file(layout, &file));
+            let image = image.map_err(|what| format!("cannot run the image {name}: {what}"))?;
+            Firmware::Loaded(elf(loader, "-loader.elf")?, image)
+        }
+    })
+}
+
+/// Returns the image and the configuration of board `number` of the line, from 1, and its flash file.
 fn config(
     fitting: &Fitting,
     number: u8,
     options: &Options,
-) -> Result<(Config, Option<FlashFile>), String> {
-    let layout = Layout::of(fitting.board).ok_or("the simulator does not know this board")?;
+    layout: &'static Layout,
+    firmware: &Firmware,
+) -> Result<(Image, Config, Option<FlashFile>), String> {
     let path = fitting.flash.as_deref();
     let opened = path.map(|path| FlashFile::open(path, layout.part.flash_size));
-    let (file, stored) = opened.transpose()?.unzip();
+    let (mut file, stored) = opened.transpose()?.unzip();
     let mut flash = stored
         .flatten()
         .unwrap_or_else(|| vec![0xFF; layout.part.flash_size]);
+    let programmed = firmware.program(layout, &mut flash, options.reflash);
+    let (image, note) = programmed.map_err(|error| format!("{}: {error}", fitting.board))?;
+    if let Some(file) = &mut file {
+        file.note = note;
+    }
     let mut config = Config {
         layout,
         dip: fitting.dip,
@@ -83,11 +112,7 @@ fn config(
         write_preset(&config, &mut flash);
     }
     config.chip.flash = Some(flash);
-    Ok((config, file))
-}
-
-fn image(elf: &Path) -> Result<Image, String> {
-    Image::read(elf).map_err(|error| format!("cannot run the image {error}"))
+    Ok((image, config, file))
 }
 
 /// Stores the modules of all slots in the configuration, and that the radio is on if there is one, if nothing is stored
@@ -156,18 +181,5 @@ mod tests {
         let at = (layout.board.store.first - FLASH_BASE) as usize;
         let (_, record) = record::records(&flash[at..]).next().unwrap();
         assert_eq!(record.pairs().last(), Some((configuration::LORA, 2)));
-    }
-
-    #[test]
-    fn broken_image_is_reported_with_its_path() {
-        let directory = tempfile::tempdir().unwrap();
-        let elf = directory.path().join("modio");
-        assert!(image(&elf).unwrap_err().contains("modio"), "missing");
-        std::fs::write(&elf, b"#!/bin/sh\n").unwrap();
-        let text = image(&elf).unwrap_err();
-        assert!(
-            text.contains("modio") && text.contains("ELF") && !text.contains('\n'),
-            "{text}"
-        );
     }
 }

@@ -5,10 +5,12 @@
 //! simulator is killed.
 
 use std::fs::{self, OpenOptions};
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use sim::Board;
+
+use super::bench::complain;
 
 /// The file, and which state of the flash it has.
 #[derive(Debug)]
@@ -20,6 +22,8 @@ pub struct FlashFile {
     holds: Option<u64>,
     /// The last write error that was reported.
     reported: Option<String>,
+    /// What has happened at the start to the firmware in the file, if a user might not expect it.
+    pub note: Option<&'static str>,
 }
 
 impl FlashFile {
@@ -58,8 +62,16 @@ impl FlashFile {
             path: path_to,
             holds: None,
             reported: None,
+            note: None,
         };
         Ok((file, contents))
+    }
+
+    /// Reports [`note`](Self::note) on stderr.
+    pub fn report_note(&self) {
+        if let Some(note) = self.note {
+            complain(&format!("{}: {note}", self.path.display()));
+        }
     }
 
     /// Writes the file if the flash has changed since the last call.
@@ -86,8 +98,7 @@ impl FlashFile {
         if let Err(what) = self.keep(board)
             && self.reported.as_ref() != Some(&what)
         {
-            // A closed stderr does not stop the simulator.
-            let _ = writeln!(io::stderr(), "modio-sim: {what}");
+            complain(&what);
             self.reported = Some(what);
         }
     }

@@ -1,39 +1,29 @@
-//! The firmware images inside the program: one for each board if `cargo xtask dist` has built the program, else none.
+//! The files inside the program: loader and images of each board if `cargo xtask dist` has built the program, else none.
 
 use register_map::Board;
 use sim::board::Layout;
 use sim::{Config, Image, Time};
 
-/// Names of boards, each with its image as an ELF file.
-const IMAGES: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/images.rs"));
+/// Names of files, each with its content.
+const FILES: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/files.rs"));
 
 /// Virtual time from power-on until the firmware has certainly logged its version.
 const LOGGED: Time = Time::from_ms(100);
 
-/// Returns the image of a board.
-///
-/// # Errors
-///
-/// If the program contains no image: what to do, in one line.
-pub fn image(board: &Board) -> Result<Image, String> {
-    let elf = elf(board).ok_or(
-        "no image to run: give one with --elf FILE, or use `cargo xtask sim`, which builds one",
-    )?;
-    Image::from_elf(&elf).map_err(|error| format!("cannot run the image inside: {error}"))
+/// Returns a file for a board, if the program contains it: `.elf` is the image that runs alone, `-loader.elf` the
+/// loader, `.modio` the images for the slots. It is a copy, because the bytes in the program do not have the alignment
+/// that the ELF reader needs.
+pub fn file(board: &Board, ending: &str) -> Option<Vec<u8>> {
+    let name = format!("{board}{ending}");
+    let inside = FILES.iter().find(|(file, _)| *file == name);
+    inside.map(|(_, content)| content.to_vec())
 }
 
-/// Returns the image of a board as an ELF file, if the program contains it. It is a copy, because the bytes in the
-/// program do not have the alignment that the ELF reader needs.
-fn elf(board: &Board) -> Option<Vec<u8>> {
-    let inside = IMAGES.iter().find(|(name, _)| *name == board.name);
-    inside.map(|(_, elf)| elf.to_vec())
-}
-
-/// Returns the version of the program, and on a line for each image inside it the version of that firmware.
+/// Returns the version of the program, and on a line for each board inside it the version of its firmware.
 pub fn version() -> String {
     let mut text = format!("modio-sim {}\n", register_map::version!());
     for layout in Layout::ALL {
-        if let Some(elf) = elf(layout.board) {
+        if let Some(elf) = file(layout.board, ".elf") {
             let version = firmware(layout, &elf).unwrap_or_else(|| "of unknown version".to_owned());
             text += &format!("firmware of the {}: {version}\n", layout.board);
         }
@@ -65,7 +55,8 @@ mod tests {
             lines.remove(0),
             format!("modio-sim {}", register_map::version!())
         );
-        assert_eq!(lines.len(), IMAGES.len(), "{lines:?}");
+        let images = FILES.iter().filter(|(name, _)| name.ends_with(".modio"));
+        assert_eq!(lines.len(), images.count(), "{lines:?}");
         for line in lines {
             assert!(!line.contains("unknown"), "{line}");
         }

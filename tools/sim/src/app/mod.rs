@@ -31,6 +31,7 @@ mod clients;
 mod disturbance;
 mod exact_line;
 mod faults;
+mod findings;
 mod flash_file;
 mod frames;
 mod gateway;
@@ -51,11 +52,12 @@ mod testing;
 mod unit;
 
 use bench::Bench;
+use flash_file::FlashFile;
 pub use inside::version;
 
 /// Virtual time from power-on until the endpoints are made and printed. Every unit answers by then: a unit that
-/// prepares its store, waits for its switch and has no crystal needs 360 ms (docs/safety.md).
-const START_UP: Time = Time::from_ms(400);
+/// prepares its store, waits for its switch and has no crystal needs 360 ms (docs/safety.md), and its loader 100 ms.
+const START_UP: Time = Time::from_ms(500);
 
 /// Most virtual time, from power-on, that the simulator waits for the first board's LoRa module to enter normal mode,
 /// before the endpoints are printed.
@@ -143,6 +145,8 @@ pub fn run(options: &Options) -> Result<(), String> {
     if let Some(path) = &options.scenario {
         bench.scenario = scenario::Scenario::read(path, &bench.known())?;
     }
+    let files = bench.units.iter().filter_map(|unit| unit.flash.as_ref());
+    files.for_each(FlashFile::report_note);
     // An unwritable file is reported now, not when the firmware saves something.
     bench.write_flash()?;
     let (events, queue) = mpsc::channel();

@@ -1,6 +1,6 @@
 //! The visible state of a board, as it is in JSON: LEDs, channels, line, log, radio.
 
-use register_map::{Board as Kind, Module};
+use register_map::{Board as Kind, Module, update::Slot as FlashSlot};
 use serde::Serialize;
 use sim::Board;
 use sim::radio::{self, Mode};
@@ -26,6 +26,10 @@ pub struct State {
     /// address.
     #[schema(required, minimum = 1, maximum = 255)]
     address: Option<u8>,
+    /// Slot of the flash whose image runs, `A` or `B`. `null` without power, in the loader, and for an image that runs
+    /// without a loader.
+    #[schema(required, schema_with = slot_names)]
+    running_slot: Option<&'static str>,
     /// Module in the first slot.
     module: ModuleName,
     /// Module that the unit has stored for the first slot.
@@ -157,23 +161,6 @@ pub struct OneBoard {
     modules: Vec<ModuleName>,
 }
 
-/// The findings of the chip model.
-#[derive(Serialize, ToSchema)]
-pub struct Findings {
-    findings: Vec<Finding>,
-}
-
-/// A finding of the chip model.
-#[derive(Serialize, ToSchema)]
-struct Finding {
-    /// Virtual time of the first occurrence, in us.
-    at_us: u64,
-    /// Address of the instruction.
-    pc: String,
-    what: String,
-    count: u64,
-}
-
 /// Name of a module.
 #[derive(Serialize)]
 pub struct ModuleName(&'static str);
@@ -204,10 +191,19 @@ fn board_names() -> RefOr<Schema> {
 /// Names of the modes of a LoRa module, or null.
 fn mode_names() -> RefOr<Schema> {
     let modes = [Mode::Normal, Mode::WakeUp, Mode::PowerSaving, Mode::Sleep];
-    let names = modes.map(|mode| Some(mode.name()));
+    one_of_or_null(modes.map(Mode::name))
+}
+
+/// Names of the slots of the flash, or null.
+fn slot_names() -> RefOr<Schema> {
+    one_of_or_null(["A", "B"])
+}
+
+/// Returns the schema of a text that is one of these, or of null.
+fn one_of_or_null<const N: usize>(names: [&'static str; N]) -> RefOr<Schema> {
     ObjectBuilder::new()
         .schema_type(SchemaType::from_iter([Type::String, Type::Null]))
-        .enum_values(Some(names.into_iter().chain([None])))
+        .enum_values(Some(names.map(Some).into_iter().chain([None])))
         .into()
 }
 
@@ -224,6 +220,7 @@ pub fn of_board(bench: &mut Bench, n: usize) -> State {
     let line = bench.bus.line();
     let settings = line.settings();
     let (rx_frames, tx_frames) = line.frame_counts();
+    let running_slot = bench.bus.board_mut(n).running_slot();
     let board = bench.bus.board(n);
     let leds = board.leds();
     let mut slots: Vec<_> = board
@@ -239,6 +236,10 @@ pub fn of_board(bench: &mut Bench, n: usize) -> State {
         powered: board.powered(),
         dip: board.dip(),
         address: address(board),
+        running_slot: running_slot.map(|slot| match slot {
+            FlashSlot::A => "A",
+            FlashSlot::B => "B",
+        }),
         module: board.module().into(),
         configured: configured(board, board.layout().slots[0].port),
         leds: Leds {
@@ -297,20 +298,6 @@ pub fn boards(bench: &Bench) -> Vec<OneBoard> {
                 .collect(),
         })
         .collect()
-}
-
-/// Returns the findings of the chip model of board `n`.
-pub fn findings(bench: &Bench, n: usize) -> Findings {
-    let findings = bench.bus.board(n).findings().iter();
-    let findings = findings.map(|finding| Finding {
-        at_us: finding.at.as_us(),
-        pc: format!("{:#010x}", finding.pc),
-        what: finding.what.to_string(),
-        count: finding.count,
-    });
-    Findings {
-        findings: findings.collect(),
-    }
 }
 
 /// Returns the LoRa module of a board.

@@ -4,6 +4,7 @@
 
 mod circuit;
 mod config;
+mod firmware;
 mod layout;
 mod outside;
 mod radio;
@@ -11,6 +12,7 @@ mod stored;
 
 pub use circuit::Modio;
 pub use config::Config;
+pub use firmware::{Firmware, InSlot};
 pub use layout::{Layout, MODIO_02, MODIO_08, SlotPins};
 pub use outside::Leds;
 pub use radio::{Radio, RadioPins};

@@ -8,9 +8,12 @@ use super::Layout;
 use f103::memory::FLASH_BASE;
 
 impl Layout {
-    /// Returns the two pages of the configuration, as ranges of the flash.
-    fn pages(&self) -> [Range<usize>; 2] {
-        let store = &self.board.store;
+    /// Returns the two pages of the configuration, as ranges of the flash. They are elsewhere in a flash with a loader.
+    pub(super) fn pages(&self, flash: &[u8]) -> [Range<usize>; 2] {
+        let store = match self.holds_loader(flash) {
+            true => self.board.layout().store,
+            false => self.board.store,
+        };
         store.addresses().map(|address| {
             let start = (address - FLASH_BASE) as usize;
             start..start + store.bytes as usize
@@ -21,14 +24,14 @@ impl Layout {
     #[must_use]
     pub fn stores_nothing(&self, flash: &[u8]) -> bool {
         let vacant = |page: &Range<usize>| flash.get(page.clone()).is_some_and(record::is_vacant);
-        self.pages().iter().all(vacant)
+        self.pages(flash).iter().all(vacant)
     }
 
     /// Returns the setting of the register at `address` in the newest configuration in this flash. `None` if the
     /// configuration does not have this register, so that its default is in force.
     #[must_use]
     pub fn stored(&self, flash: &[u8], address: u16) -> Option<u16> {
-        let pages = self.pages();
+        let pages = self.pages(flash);
         let records = pages
             .iter()
             .filter_map(|page| flash.get(page.clone()))
@@ -55,7 +58,7 @@ impl Layout {
     /// Stores these settings (address and value of a register) in a flash without a configuration. Returns whether they
     /// fit into a page.
     pub fn store(&self, flash: &mut [u8], settings: &[(u16, u16)]) -> bool {
-        let [first, _] = self.pages();
+        let [first, _] = self.pages(flash);
         let Some(page) = flash.get_mut(first) else {
             return false;
         };

@@ -1,7 +1,7 @@
 //! The command-line options of the simulator.
 
 use std::net::SocketAddr;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use register_map::{Board, Module, board::MODIO_02};
@@ -9,13 +9,15 @@ use register_map::{Board, Module, board::MODIO_02};
 use crate::Corner;
 use crate::line::Settings;
 
+mod files;
 mod fitting;
 mod terminals;
 mod values;
 
+pub use files::Files;
 pub use fitting::{Fitting, toml_error};
 pub use values::slot;
-use values::{address, elf, line, unit};
+use values::{OfBoard, address, line, of_board, unit};
 
 /// Whether the simulator has pseudo-terminals on this system. macOS has them, too, but they were never tested there.
 pub const PTY: bool = cfg!(all(unix, not(target_os = "macos")));
@@ -119,13 +121,31 @@ pub struct Options {
     #[arg(long, value_name = "ADDR", value_parser = address)]
     pub gdb: Option<SocketAddr>,
 
-    /// Run this image instead of building one; with BOARD= only on boards of that type; may be repeated
-    #[arg(long, value_name = "[BOARD=]FILE", value_parser = elf)]
-    pub elf: Vec<(Option<&'static Board>, PathBuf)>,
+    /// Start with this loader (an ELF file) instead of building one; with BOARD= only boards of that type; may be
+    /// repeated
+    #[arg(long, value_name = "[BOARD=]FILE", value_parser = of_board)]
+    pub loader: Vec<OfBoard>,
 
-    /// Print the name of each board that `--elf` has no image for, and end: `cargo xtask sim` builds these images
+    /// Write this image into the slot that it is for instead of building one: the file of an update (.modio, the image
+    /// for slot A), or of one slot (.image). The signature is not checked, as if the unit had been started once
+    #[arg(long, value_name = "[BOARD=]FILE", value_parser = of_board)]
+    pub image: Vec<OfBoard>,
+
+    /// Write loader and image again into a flash file that an update over the line has changed
+    #[arg(long, requires = "flash")]
+    pub reflash: bool,
+
+    /// Run the image that needs no loader, as on a board that is not updated over the line
+    #[arg(long, conflicts_with_all = ["loader", "image", "reflash"])]
+    pub no_loader: bool,
+
+    /// Run this image (an ELF file) alone, without loader; with BOARD= only on boards of that type; may be repeated
+    #[arg(long, value_name = "[BOARD=]FILE", value_parser = of_board)]
+    pub elf: Vec<OfBoard>,
+
+    /// Print the files that the options do not name, such as "loader modio-02", and end: `cargo xtask sim` builds them
     #[arg(long, hide = true)]
-    pub missing_images: bool,
+    pub missing_files: bool,
 
     /// Stop after this much time, such as 10s or 2m
     #[arg(long = "for", value_name = "DURATION", value_parser = humantime::parse_duration)]
@@ -137,35 +157,6 @@ impl Options {
     #[must_use]
     pub fn preset(&self) -> bool {
         !self.no_preset
-    }
-}
-
-impl Options {
-    /// Returns the image for a board: the last one for its type, or else the last one for all boards.
-    #[must_use]
-    pub fn elf_of(&self, board: &Board) -> Option<&Path> {
-        let last = |wanted: Option<&Board>| {
-            let mut named = self.elf.iter().rev();
-            named.find(|(of, _)| of.map(|of| of.name) == wanted.map(|of| of.name))
-        };
-        let (_, path) = last(Some(board)).or_else(|| last(None))?;
-        Some(path)
-    }
-
-    /// Returns the types of boards on the line that `--elf` has no image for.
-    ///
-    /// # Errors
-    ///
-    /// In one line, why the simulator cannot run with these options.
-    pub fn boards_without_image(&self) -> Result<Vec<&'static Board>, String> {
-        self.check_line()?;
-        let fittings = self.fittings()?;
-        let mut boards = Board::ALL.to_vec();
-        boards.retain(|board| {
-            let wanted = fittings.iter().any(|fitting| fitting.board == *board);
-            wanted && self.elf_of(board).is_none()
-        });
-        Ok(boards)
     }
 }
 
@@ -186,7 +177,7 @@ pub fn one_line(error: &clap::Error) -> String {
 mod tests {
     use super::*;
     use clap::Parser;
-    use register_map::{board::MODIO_08, codes};
+    use register_map::codes;
 
     #[derive(Parser)]
     struct Cli {
@@ -209,6 +200,7 @@ mod tests {
         assert!(options.preset());
         assert_eq!((options.pty, options.tcp), (None, None));
         assert!(options.elf.is_empty() && options.units.is_empty());
+        assert!(options.loader.is_empty() && options.image.is_empty());
         assert_eq!((options.bus, options.scenario), (None, None));
         assert!(!options.fixed_line);
         assert_eq!((options.flash, options.gdb), (None, None));
@@ -241,30 +233,6 @@ mod tests {
     fn unit_option_names_an_address_and_optionally_a_module() {
         let units = parse(&["--unit", "5:4do", "--unit", "6"]).unwrap().units;
         assert_eq!(units, [(5, Some(Module::Do4)), (6, None)]);
-    }
-
-    #[test]
-    fn elf_option_can_name_a_type_of_board() {
-        let arguments = ["--elf", "a", "--elf", "modio-08=b", "--elf", "x=c"];
-        let options = parse(&arguments).unwrap();
-        assert_eq!(options.elf_of(&MODIO_08), Some(Path::new("b")));
-        assert_eq!(options.elf_of(&MODIO_02), Some(Path::new("x=c")));
-        let only = parse(&["--elf", "modio-08=b"]).unwrap();
-        assert_eq!(only.elf_of(&MODIO_02), None);
-    }
-
-    #[test]
-    fn boards_without_an_image_are_those_on_the_line_that_no_elf_option_names() {
-        let missing = |arguments: &[&str]| {
-            let mut options = parse(arguments).unwrap();
-            options.tcp = options.http.into();
-            options.boards_without_image()
-        };
-        assert_eq!(missing(&[]), Ok(vec![&MODIO_02]));
-        let other = ["--board", "modio-08", "--elf", "modio-02=a"];
-        assert_eq!(missing(&other), Ok(vec![&MODIO_08]));
-        assert_eq!(missing(&["--elf", "a"]), Ok(vec![]));
-        assert!(missing(&["--bus", "nowhere"]).is_err());
     }
 
     #[test]
@@ -347,6 +315,8 @@ mod tests {
             ),
             (&["--elf", ""][..], "name of a file"),
             (&["--elf", "modio-02="][..], "name of a file"),
+            (&["--no-loader", "--image", "x"][..], "cannot be used with"),
+            (&["--reflash"][..], "--flash <FILE>"),
             (&["--line", "9600,7N1"][..], "9600,7N2"),
             (&["--line", "100,8N2"][..], "9600,7N2"),
         ] {

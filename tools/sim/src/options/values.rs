@@ -8,8 +8,11 @@ use register_map::{Board, Module};
 
 use crate::line::{Format, Settings};
 
+/// A file, for boards of one type or of any.
+pub type OfBoard = (Option<&'static Board>, PathBuf);
+
 /// Parses `FILE` or `BOARD=FILE`. A text in front of `=` that is not the name of a board is part of the file's name.
-pub fn elf(text: &str) -> Result<(Option<&'static Board>, PathBuf), String> {
+pub fn of_board(text: &str) -> Result<OfBoard, String> {
     let named = text.split_once('=').and_then(|(name, file)| {
         let board: &'static Board = name.parse().ok()?;
         Some((Some(board), PathBuf::from(file)))

@@ -52,17 +52,17 @@ fn started(more: &[&str]) -> (Running, String, String) {
 fn no_virtual_time_passes_between_requests() {
     let (_running, line, http) = started(&[]);
     let mut client = Client::connect(&line);
-    assert_eq!(client.ask(b"run 0\n"), "ok 400000.000\n");
+    assert_eq!(client.ask(b"run 0\n"), "ok 500000.000\n");
     std::thread::sleep(Duration::from_millis(300));
-    assert_eq!(client.ask(b"run 1500.5\r\n"), "ok 401500.500\n");
+    assert_eq!(client.ask(b"run 1500.5\r\n"), "ok 501500.500\n");
     assert_eq!(
         state(&http)["virtual_ms"],
-        401,
+        501,
         "the front panel shows the virtual time"
     );
     let hello = client.ask(b"hello 1\n");
     assert!(
-        hello.starts_with("ok 401500.500 version=1 line=9600,8N2 "),
+        hello.starts_with("ok 501500.500 version=1 line=9600,8N2 "),
         "{hello}"
     );
 }
@@ -120,7 +120,7 @@ fn a_line_that_is_too_long_ends_the_connection_and_the_next_client_is_served() {
         "{reply}"
     );
     assert_eq!(client.stream.read(&mut [0; 8]).unwrap(), 0);
-    assert_eq!(served(&line).ask(b"run 0\n"), "ok 400000.000\n");
+    assert_eq!(served(&line).ask(b"run 0\n"), "ok 500000.000\n");
 }
 
 /// Connects until the server has noticed that the previous client has disconnected.
@@ -144,13 +144,13 @@ fn served(line: &str) -> Client {
 fn second_client_is_refused_and_the_first_is_still_served() {
     let (_running, line, _) = started(&[]);
     let mut first = Client::connect(&line);
-    assert_eq!(first.ask(b"run 10\n"), "ok 400010.000\n");
+    assert_eq!(first.ask(b"run 10\n"), "ok 500010.000\n");
     let mut second = Client::silent(&line);
     assert_eq!(
         second.read(),
         "error the line is in use by another client\n"
     );
-    assert_eq!(first.ask(b"run 10\n"), "ok 400020.000\n");
+    assert_eq!(first.ask(b"run 10\n"), "ok 500020.000\n");
 }
 
 #[test]
@@ -173,7 +173,7 @@ fn connection_that_does_not_begin_with_hello_has_no_effect() {
     // A connection that sends nothing does not take the line either.
     let _idle = Client::silent(&line);
     let mut client = Client::connect(&line);
-    assert_eq!(client.ask(b"run 0\n"), "ok 400000.000\n");
+    assert_eq!(client.ask(b"run 0\n"), "ok 500000.000\n");
     assert_eq!(state(&http)["powered"], true);
 }
 
@@ -186,7 +186,7 @@ fn a_client_that_disconnects_in_the_middle_is_replaced_by_the_next() {
     let mut client = served(&line);
     assert_eq!(
         client.ask(b"run 0\n"),
-        "ok 400000.000\n",
+        "ok 500000.000\n",
         "an incomplete line is not a request"
     );
     // This request takes a minute of virtual time, and its client does not wait for the reply.
@@ -196,7 +196,7 @@ fn a_client_that_disconnects_in_the_middle_is_replaced_by_the_next() {
         .write_all(b"run 60000000\n")
         .unwrap();
     drop(client);
-    assert_eq!(served(&line).ask(b"run 0\n"), "ok 60400000.000\n");
+    assert_eq!(served(&line).ask(b"run 0\n"), "ok 60500000.000\n");
 }
 
 #[cfg(unix)]

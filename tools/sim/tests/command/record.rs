@@ -68,7 +68,7 @@ fn recording_of_the_exact_line_has_the_instants_of_virtual_time() {
         assert_eq!(running.end().0, status);
         files.push(packets(&path));
     }
-    assert_eq!(files[0][0].0, 401_000_000, "400 ms of start-up, and 1 ms");
+    assert_eq!(files[0][0].0, 501_000_000, "500 ms of start-up, and 1 ms");
     assert_eq!(files[0], files[1], "every run has the same instants");
 }
 

@@ -14,7 +14,7 @@
 //! | the line | `noise`, `pulses`, `timing`, `silences`, `dip`, `bus` |
 //! | points | `points`, `analog_inputs`, `analog_outputs`, `dac_faults`, `counters` |
 //! | configuration | `in_force`, `storing`, `saving`, `save_budget`, `flash_faults`, `power_cut` |
-//! | the simulator | `cores`: boards of one process share translated code |
+//! | the simulator | `cores`: boards of one process share translated code; `programmed`: loader and image in its flash |
 //! | the radio | `radio`, `air` |
 //! | the loader, and an update over the line | `loading`, `updating` |
 //! | safety | `boot`, `clock`, `outputs_at_start`, `comm_watchdog`, `hung_task`, `faults`, `upsets`, `kept`, `stack`, `log`, `long_run` |
@@ -50,6 +50,7 @@ mod noise;
 mod outputs_at_start;
 mod points;
 mod power_cut;
+mod programmed;
 mod pulses;
 mod radio;
 mod registers;

@@ -490,7 +490,7 @@ fn the_points_are_served_and_no_byte_is_lost_during_an_update() {
         while bench.update_status().pages > 0 {
             serve(&mut bench);
         }
-        for (number, block) in (0..60).zip(image(1).chunks(BLOCK_BYTES)) {
+        for (number, block) in (0..20).zip(image(1).chunks(BLOCK_BYTES)) {
             while bench.block(Slot::B, number, block).is_err() {}
             serve(&mut bench);
         }
@@ -500,7 +500,7 @@ fn the_points_are_served_and_no_byte_is_lost_during_an_update() {
         // Errors, no response, overruns.
         let counted = [0x0231, 0x0234, 0x0237].map(|address| bench.register(address));
         assert_eq!(counted, [0; 3], "{baud:?}");
-        assert!(switches > 50);
+        assert!(switches > 20, "{switches}");
         // The communication watchdog trips at its time although a page is being erased.
         assert_eq!(bench.order(Command::Prepare), Ok(()));
         let last = bench.sent;
@@ -574,7 +574,8 @@ fn change(flash: &mut [u8], change: &Change, cut: Option<u64>) {
 
 /// A whole update, from the order to prepare to the confirmation: the flash before it, and its changes.
 fn recorded() -> (Vec<u8>, Vec<Change>) {
-    let mut bench = running();
+    // Something to erase is in slot B.
+    let mut bench = unit_of([&image(0), &image(1)]);
     let first = bench.board.flash().to_vec();
     let (mut before, mut all) = (first.clone(), Vec::new());
     let mut note = |bench: &Bench| {

@@ -20,8 +20,9 @@ use self::body::{Dip, Plug, Power};
 use super::action::{Action, Change};
 use super::bench::Bench;
 use super::faults::Faults;
+use super::findings::{self, Findings};
 use super::frames::{self, Frames};
-use super::state::{self, Findings, OneBoard, State};
+use super::state::{self, OneBoard, State};
 
 /// Longest reason of a refusal, in characters.
 const LONGEST_REASON: usize = 300;
@@ -207,7 +208,7 @@ fn get_endpoints(bench: &Bench) -> Value {
     responses((status = 200, description = "The findings, oldest first", body = inline(Findings)))
 )]
 fn get_findings(bench: &Bench, n: usize) -> Value {
-    json(&state::findings(bench, n))
+    json(&findings::of_board(bench, n))
 }
 
 /// This description
