@@ -1,4 +1,4 @@
-//! `update`, with units that the test serves.
+//! `update`, with units that the test serves, and with the loader and the image in the simulator.
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -13,6 +13,7 @@ use register_map::update::{Slot, State};
 
 use crate::program::{At, has};
 use crate::served::{modio_02, response, serve_requests, server};
+use crate::unit::{Unit, update_file};
 
 #[allow(dead_code, reason = "the tests of the plan use the rest")]
 #[path = "../../src/update/model.rs"]
@@ -243,4 +244,35 @@ fn status_shows_both_slots_and_the_way_back_exchanges_them() {
         &["unit 1: 0.1.2 (00030004) -> 1.0.7 (aaaabbbb) in slot B, confirmed"],
     );
     assert_eq!(line.blocks(), 0);
+}
+
+#[test]
+#[ignore = "needs the simulator: cargo xtask test"]
+fn a_unit_takes_the_image_for_its_other_slot_and_goes_back() {
+    let unit = Unit::with_loader();
+    let at = At::port(unit.pty.display());
+    at.run("config set BAUD=115200").fine();
+    at.run("config save").fine();
+    at.run("reboot").fine();
+    let run = |words: &str| at.run(&format!("--baud 115200 update {words}")).fine();
+    let file = update_file();
+    let file = file.display();
+    has(
+        &run(&file.to_string()),
+        &["in slot A, it runs that already"],
+    );
+    let text = run(&format!("{file} --force --poll p5.1"));
+    has(
+        &text,
+        &[
+            "p5.1 off",
+            "unit 1: ",
+            "in slot B, confirmed",
+            " blocks sent for ",
+        ],
+    );
+    has(&run("--status"), &["1     modio-02  B     "]);
+    has(&run("--back"), &["in slot A, confirmed"]);
+    let text = at.run("--baud 115200 info").fine();
+    has(&text, &["slot A runs, confirmed; slot B confirmed"]);
 }
