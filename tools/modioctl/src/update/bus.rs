@@ -129,7 +129,7 @@ impl Bus {
             let (first, _) = self.blocks.unwrap_or((begins, begins));
             self.blocks = Some((first, self.now));
         }
-        campaign.heard(answer.as_deref());
+        campaign.take_answer(answer.as_deref());
         true
     }
 

@@ -50,7 +50,7 @@ pub enum Patience {
 /// What to do next.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// Send a request to a unit, and pass its answer to [`Campaign::heard`].
+    /// Send a request to a unit, and pass its answer to [`Campaign::take_answer`].
     Ask {
         /// Address of the unit.
         unit: u8,
@@ -68,7 +68,7 @@ pub enum Step {
         /// How long the line must be idle before it, in addition to the silence between frames.
         pause: Duration,
     },
-    /// Send this to all units, and pass anything that is received to [`Campaign::heard`]: nothing should be.
+    /// Send this to all units, and pass received bytes to [`Campaign::take_answer`]. Usually nothing answers.
     Probe(Vec<u8>),
     /// Leave the line idle for this time.
     Wait(Duration),
@@ -168,7 +168,7 @@ impl Campaign {
         self.unicast
     }
 
-    /// Returns what to do next, or `None` at the end. Call [`Self::heard`] after each step.
+    /// Returns what to do next, or `None` at the end. Call [`Self::take_answer`] after each step.
     pub fn next_step(&mut self) -> Option<Step> {
         while self.queue.is_empty() {
             self.plan()?;

@@ -20,7 +20,7 @@ mod model;
 mod sample;
 
 pub use campaign::{Campaign, Patience, Step};
-pub use fault::{Fault, said};
+pub use fault::{Fault, reason_text};
 pub use file::{File, Image};
 pub use messages::{Status, read_status};
 pub use unit::{Stage, Unit};

@@ -24,7 +24,7 @@ const ROUNDS: u8 = 10;
 /// How far a unit is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// It must be told to prepare.
+    /// It needs the order to prepare.
     Waiting,
     /// It erases the slot that does not run.
     Erasing,

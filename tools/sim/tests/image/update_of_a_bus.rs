@@ -131,7 +131,7 @@ impl Line {
                     })
                 }
             };
-            campaign.heard(answer.as_deref());
+            campaign.take_answer(answer.as_deref());
             let (now_sent, _) = campaign.blocks();
             if now_sent > sent {
                 sent = now_sent;

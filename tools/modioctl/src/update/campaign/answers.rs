@@ -8,7 +8,7 @@ use crate::update::{Fault, Stage, Status};
 
 impl Campaign {
     /// Takes what followed a step: the answer of a unit, or whatever was received after a probe.
-    pub fn heard(&mut self, answer: Option<&[u8]>) {
+    pub fn take_answer(&mut self, answer: Option<&[u8]>) {
         let Some(action) = self.pending.take() else {
             return;
         };
@@ -119,7 +119,9 @@ impl Campaign {
                 let before = unit.lacks();
                 if status.blocks == 0 && status.reason == 0 {
                     self.send_to_each();
-                } else if usize::from(status.missing) + sent > before + sent / 4 {
+                } else if usize::from(status.missing) + sent > before + sent / 4
+                    && self.pause < SLOWEST
+                {
                     self.pause = (2 * self.pause + SLOWER).min(SLOWEST);
                     self.queue.clear();
                 }
