@@ -74,21 +74,28 @@ pub enum Step {
     Wait(Duration),
 }
 
-/// A step with its purpose. Units are given by their index.
+/// A step with its purpose. A unit is given by its index, a block by its number.
 #[derive(Clone, Copy, Debug)]
 enum Action {
     Wait(Duration),
     Probe,
     Broadcast(usize),
+    /// Send a block to a unit.
     Block(usize, usize),
+    /// Open the lock, then give the order.
     Unlock(usize, Command),
     Order(usize, Command),
+    /// Read file 2 up to the descriptions of both images.
     Status(usize),
-    /// Asks how many have arrived of this number of blocks that the unit was missing.
+    /// Read how many blocks are missing, after this number of blocks that the unit was missing.
     Early(usize, usize),
+    /// Read how many blocks are missing.
     Short(usize),
+    /// Read which blocks are missing.
     Bits(usize),
+    /// Read version and commit.
     Identity(usize),
+    /// Read whether the image is confirmed.
     Confirmed(usize),
 }
 

@@ -125,9 +125,11 @@ fn a_unit_that_restarts_begins_again_and_one_that_is_gone_does_not_hold_up_the_o
     let mut bus = Bus::new(115_200, 4);
     bus.units[1].flaw = Flaw::RestartsAfter(100);
     bus.units[2].flaw = Flaw::GoneAfter(200);
+    bus.units[3].flaw = Flaw::RestartsAfter(20);
     let campaign = update(&mut bus, false);
     let (done, gone) = (Stage::Done, Stage::Failed(Fault::Silent));
     assert_eq!(stages(&campaign), [done, done, gone, done]);
+    assert!(!campaign.is_unicast());
     let (sent, _) = campaign.blocks();
     assert!(sent < 2 * BLOCKS + 10, "{sent}");
 }

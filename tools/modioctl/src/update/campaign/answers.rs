@@ -1,6 +1,7 @@
 //! What the answers of units mean for the plan.
 
 use register_map::codes::Command;
+use register_map::update::State;
 
 use super::{Action, Campaign, PROGRAMMING, SLOWER, SLOWEST};
 use crate::update::messages;
@@ -117,7 +118,9 @@ impl Campaign {
             },
             (Action::Early(_, sent), Some(status)) => {
                 let before = unit.lacks();
-                if status.blocks == 0 && status.reason == 0 {
+                if status.state != Some(State::Receiving) {
+                    unit.reports(&status);
+                } else if status.blocks == 0 && status.reason == 0 {
                     self.send_to_each();
                 } else if usize::from(status.missing) + sent > before + sent / 4
                     && self.pause < SLOWEST
