@@ -39,6 +39,11 @@ struct Line {
 impl Line {
     /// Serves units 1 to `count`, after a change of each.
     fn new(count: u8, change: impl FnMut(&mut Model)) -> Self {
+        Self::with_echo(count, change, false)
+    }
+
+    /// The same, with an adapter that may return what it sends.
+    fn with_echo(count: u8, change: impl FnMut(&mut Model), echo: bool) -> Self {
         let mut units: Vec<_> = (1..=count).map(Model::new).collect();
         for unit in &mut units {
             unit.page = Duration::from_millis(2);
@@ -47,7 +52,7 @@ impl Line {
         units.iter_mut().for_each(change);
         let units = Arc::new(Mutex::new(units));
         let written = Arc::default();
-        let at = At::tcp(serve(&units, &written));
+        let at = At::tcp(serve(&units, &written, echo));
         let folder = tempfile::tempdir().unwrap();
         Self {
             units,
@@ -80,7 +85,11 @@ impl Line {
     }
 }
 
-fn serve(units: &Arc<Mutex<Vec<Model>>>, written: &Arc<Mutex<Vec<Vec<u8>>>>) -> SocketAddr {
+fn serve(
+    units: &Arc<Mutex<Vec<Model>>>,
+    written: &Arc<Mutex<Vec<Vec<u8>>>>,
+    echo: bool,
+) -> SocketAddr {
     let (units, written) = (Arc::clone(units), Arc::clone(written));
     let begin = Instant::now();
     let mut server = server(modio_02(Module::Di4));
@@ -92,15 +101,23 @@ fn serve(units: &Arc<Mutex<Vec<Model>>>, written: &Arc<Mutex<Vec<Vec<u8>>>>) -> 
         let first = u16::from_be_bytes([pdu[1], pdu[2]]);
         let is_points =
             pdu[0] == 1 || (pdu[0] == 3 && ![FIRMWARE_VERSION, UPDATE].contains(&first));
+        let mut bytes = match echo {
+            true => Framing::Rtu.frame(0, unit, pdu),
+            false => Vec::new(),
+        };
         if is_points && units.iter().any(|known| known.address == unit) {
-            return Some(response(&mut server, unit, pdu));
+            bytes.extend(response(&mut server, unit, pdu));
+            return Some(bytes);
         }
         let answers = units
             .iter_mut()
             .filter_map(|known| known.take(unit, pdu, begin.elapsed()));
         // All units take a broadcast.
         let answer = answers.collect::<Vec<_>>().pop();
-        Some(answer.map_or(Vec::new(), |pdu| Framing::Rtu.frame(0, unit, &pdu)))
+        if let Some(answer) = answer {
+            bytes.extend(Framing::Rtu.frame(0, unit, &answer));
+        }
+        Some(bytes)
     })
 }
 
@@ -132,6 +149,19 @@ fn units_are_updated_together_and_again_only_when_it_is_forced() {
     assert_eq!(json["units"][0]["slot"], "A");
     assert_eq!(json["units"][0]["result"], "confirmed");
     assert!(json["seconds"]["blocks"].as_f64().unwrap() > 0.1, "{json}");
+}
+
+#[test]
+fn blocks_are_broadcast_unless_something_answers_and_an_echo_is_no_answer() {
+    let answers = |unit: &mut Model| unit.flaw = Flaw::AnswersBroadcasts;
+    for (line, alone) in [
+        (Line::with_echo(2, |_| (), true), false),
+        (Line::new(2, answers), true),
+    ] {
+        let text = line.run("update FILE --units 1-2").fine();
+        has(&text, &["unit 1: 0.1.2", "unit 2: 0.1.2"]);
+        assert_eq!(text.contains("to each unit alone"), alone, "{text}");
+    }
 }
 
 #[test]
