@@ -70,7 +70,6 @@ fn bit_errors_cost_what_is_missing_anywhere() {
                 bus.ratio(BLOCKS)
             });
             let ratio = ratios.sum::<f64>() / RUNS as f64;
-            println!("{errors:?} {baud} {ratio}");
             assert!(ratio <= most, "{errors:?} at {baud} bit/s: {ratio:.3}");
         }
     }
