@@ -11,13 +11,7 @@ mod messages;
 mod unit;
 
 #[cfg(test)]
-mod bus;
-#[cfg(test)]
-mod campaign_tests;
-#[cfg(test)]
-mod model;
-#[cfg(test)]
-mod sample;
+mod tests;
 
 pub use campaign::{Campaign, Patience, Step};
 pub use fault::{Fault, reason_text};

@@ -5,8 +5,9 @@ use register_map::update::{Reason, Slot, State};
 
 use super::{Fault, Status};
 
-/// Number of requests in a row without an answer after which a unit is given up, and of those after a restart.
-const SILENCES: u8 = 3;
+/// Number of requests in a row without an answer after which a unit is given up. Two of them are sent with little
+/// patience, the others repeated as often as the line says.
+const SILENCES: u8 = 4;
 /// Number of polls after a restart, half a second and more apart, until the image must run.
 const RESTART_POLLS: u8 = 60;
 /// Number of such polls that show the state before an order, after which the order is given again: its answer may have

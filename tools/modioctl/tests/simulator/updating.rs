@@ -16,10 +16,10 @@ use crate::served::{modio_02, response, serve_requests, server};
 use crate::unit::{Unit, update_file};
 
 #[allow(dead_code, reason = "the tests of the plan use the rest")]
-#[path = "../../src/update/model.rs"]
+#[path = "../../src/update/tests/model.rs"]
 mod model;
 #[allow(dead_code, reason = "the tests of the file use the rest")]
-#[path = "../../src/update/sample.rs"]
+#[path = "../../src/update/tests/sample.rs"]
 mod sample;
 
 use model::{Flaw, Model};

@@ -6,7 +6,7 @@ use modbus_line::{Format, LineFormat, t35};
 use register_map::update::BLOCK_BYTES;
 
 use super::model::Model;
-use super::{Campaign, Patience, Step};
+use crate::update::{Campaign, Patience, Step};
 
 /// Time for which the master waits for an answer as usual, three times.
 const USUAL: Duration = Duration::from_secs(1);
