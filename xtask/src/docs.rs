@@ -189,7 +189,11 @@ fn write_set(values: Values, out: &mut impl Write) -> Result {
         }
         Values::OneOf(set) => set.iter().enumerate().try_for_each(|(i, value)| {
             out.write_str(if i == 0 { "" } else { " " })?;
-            write!(out, "{value}")
+            // As the names of a code.
+            match value {
+                ..0xB000 => write!(out, "{value}"),
+                _ => write!(out, "{value:#06X}"),
+            }
         }),
     }
 }

@@ -2,6 +2,7 @@
 //! documentation with every warning an error, and steps that take longer.
 
 use std::env;
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::thread;
 
@@ -319,6 +320,13 @@ fn sim_at(workspace: &mut Workspace, corner: &str) -> Result<()> {
     simulated(workspace, "--test=image_08", AT_CORNERS_08, &corner)
 }
 
+/// Builds the loader of a board, the signed images for slots A and B, and the file of an update, and returns their paths.
+fn loaded(workspace: &mut Workspace, board: &'static Board) -> Result<[PathBuf; 4]> {
+    let loader = build::loader(workspace, board)?;
+    let ([a, b], update) = signed::update(workspace, &signed::Options::of(board))?;
+    Ok([loader, a, b, update])
+}
+
 /// Runs tests that run the images in the simulator, as an ordinary user: those of these targets whose names contain one
 /// of `names`, or all. Spaces separate targets and names. A name that begins with `--` is an option of the tests. The
 /// variables choose the corner of the part, and how long a test is.
@@ -330,12 +338,19 @@ pub fn simulated(
 ) -> Result<()> {
     let ordinary = ordinary::words()?;
     let mut files = Vec::new();
-    let updates = |target| ["--test=image", "--test=simulator"].contains(&target);
-    if targets.split(' ').any(updates) {
-        files.push(("MODIO_LOADER", build::loader(workspace, &MODIO_02)?));
-        let options = signed::Options::of(&MODIO_02);
-        let ([a, b], update) = signed::update(workspace, &options)?;
-        files.extend([("MODIO_A", a), ("MODIO_B", b), ("MODIO_UPDATE", update)]);
+    let updates = |of: &str| targets.split(' ').any(|target| target == of);
+    if updates("--test=image") || updates("--test=simulator") {
+        let names = ["MODIO_LOADER", "MODIO_A", "MODIO_B", "MODIO_UPDATE"];
+        files.extend(names.into_iter().zip(loaded(workspace, &MODIO_02)?));
+    }
+    if updates("--test=image_08") {
+        let names = [
+            "MODIO_LOADER_08",
+            "MODIO_A_08",
+            "MODIO_B_08",
+            "MODIO_UPDATE_08",
+        ];
+        files.extend(names.into_iter().zip(loaded(workspace, &MODIO_08)?));
     }
     // Afterwards, because an application for a slot has the same name until it is renamed.
     files.push(("MODIO_ELF", build::image(workspace, &MODIO_02)?));

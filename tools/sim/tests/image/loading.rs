@@ -6,7 +6,7 @@ use sim::Time;
 
 use crate::{
     LAYOUT,
-    slots::{
+    in_slots::{
         APPLICATION, CHECK, CRC, HASH, KEY, LENGTH, SIGNATURE, START, answers, image, runs_from,
         unit, with_crc,
     },

@@ -16,7 +16,7 @@
 //! | configuration | `in_force`, `storing`, `saving`, `save_budget`, `flash_faults`, `power_cut` |
 //! | the simulator | `cores`: boards of one process share translated code; `programmed`: loader and image in its flash |
 //! | the radio | `radio`, `air` |
-//! | the loader, and an update over the line | `loading`, `updating` |
+//! | the loader, and an update over the line | `loading`, `updating`, `campaign` |
 //! | safety | `boot`, `clock`, `outputs_at_start`, `comm_watchdog`, `hung_task`, `faults`, `upsets`, `kept`, `stack`, `log`, `long_run` |
 
 use sim::board::{Layout, MODIO_02};
@@ -25,6 +25,8 @@ use sim::board::{Layout, MODIO_02};
 const LAYOUT: &Layout = &MODIO_02;
 /// The variable that names the image.
 const ELF: &str = "MODIO_ELF";
+/// Those of the loader, of the signed images for slots A and B, and of the file of an update.
+const FILES: [&str; 4] = ["MODIO_LOADER", "MODIO_A", "MODIO_B", "MODIO_UPDATE"];
 
 mod air;
 mod analog_inputs;
@@ -32,6 +34,7 @@ mod analog_outputs;
 mod bench;
 mod boot;
 mod bus;
+mod campaign;
 mod clock;
 mod comm_watchdog;
 mod cores;
@@ -42,6 +45,7 @@ mod faults;
 mod flash_faults;
 mod hung_task;
 mod in_force;
+mod in_slots;
 mod kept;
 mod loading;
 mod log;
@@ -58,7 +62,6 @@ mod save_budget;
 mod saving;
 mod self_description;
 mod silences;
-mod slots;
 mod stack;
 mod storing;
 mod timing;

@@ -7,7 +7,7 @@ use sim::board::{Firmware, InSlot, MODIO_02};
 
 use crate::{
     bench::{PORT, path},
-    slots::{START, answers, holding},
+    in_slots::{START, answers, holding},
 };
 
 fn in_slot(file: &str) -> InSlot {

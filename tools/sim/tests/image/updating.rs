@@ -11,7 +11,7 @@ use sim::{Module, Time};
 
 use crate::LAYOUT;
 use crate::bench::{Bench, PAGE_SIZE, SLOT};
-use crate::slots::{
+use crate::in_slots::{
     APPLICATION, CHECK, HASH, LENGTH, SIGNATURE, START, answers, answers_as, fitted, flash,
     holding, image, runs_from, sign, signed, unit, with_crc,
 };

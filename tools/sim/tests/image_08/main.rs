@@ -3,7 +3,7 @@
 //!
 //! The tests of the four slots are in `slots`, `analog`, `digital` and `faults_of_slots`. The other files are those of
 //! the modio-02's tests whose result depends on the board, with one module in the first slot: start, store, timing,
-//! stack, and the pins of the radio.
+//! stack, the pins of the radio, and an update.
 
 use sim::board::{Layout, MODIO_08};
 
@@ -11,6 +11,13 @@ use sim::board::{Layout, MODIO_08};
 const LAYOUT: &Layout = &MODIO_08;
 /// The variable that names the image.
 const ELF: &str = "MODIO_ELF_08";
+/// Those of the loader, of the signed images for slots A and B, and of the file of an update.
+const FILES: [&str; 4] = [
+    "MODIO_LOADER_08",
+    "MODIO_A_08",
+    "MODIO_B_08",
+    "MODIO_UPDATE_08",
+];
 
 mod analog;
 mod digital;
@@ -23,6 +30,11 @@ mod slots;
 mod bench;
 #[path = "../image/boot.rs"]
 mod boot;
+#[path = "../image/campaign.rs"]
+mod campaign;
+#[allow(dead_code, reason = "other tests of the modio-02 use the rest")]
+#[path = "../image/in_slots.rs"]
+mod in_slots;
 #[path = "../image/power_cut.rs"]
 mod power_cut;
 #[allow(dead_code, reason = "the tests over the air use the rest")]

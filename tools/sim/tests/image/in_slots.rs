@@ -6,11 +6,11 @@ use ed25519_dalek::{Signer as _, SigningKey};
 use register_map::configuration::MODULE;
 use register_map::update::crc32;
 use sha2::{Digest as _, Sha512};
-use sim::{Config, Image, Module, Time, chip};
+use sim::{Board, Config, Image, Module, Time, chip};
 
 use crate::{
-    LAYOUT,
-    bench::{Bench, PAGE_SIZE, PORT, flash_with_settings, pages, path},
+    FILES, LAYOUT,
+    bench::{Bench, PAGE_SIZE, PORT, corner, flash_with_settings, pages, path},
 };
 
 /// Offset of the application in an image, and of fields in the header.
@@ -29,10 +29,11 @@ pub const CHECK: Time = Time::from_ms(4_000);
 
 /// The loader, and the images for slots A and B.
 static BUILT: LazyLock<(Image, [Vec<u8>; 2])> = LazyLock::new(|| {
-    let image = |name| fs::read(path(name)).expect("the image can be read");
+    let [loader, a, b, _] = FILES.map(path);
+    let image = |file| fs::read(file).expect("the image can be read");
     (
-        Image::read(&path("MODIO_LOADER")).expect("the loader can be read"),
-        [image("MODIO_A"), image("MODIO_B")],
+        Image::read(&loader).expect("the loader can be read"),
+        [image(a), image(b)],
     )
 });
 
@@ -96,16 +97,27 @@ pub fn holding(flash: Vec<u8>, dip: u8) -> Bench {
 
 /// The same, with a module.
 pub fn fitted(flash: Vec<u8>, module: Module, dip: u8) -> Bench {
-    let config = Config {
+    let mut bench = Bench::of(&BUILT.0, config(flash, module, dip));
+    // The loader's reset after a check.
+    bench.tolerant = true;
+    bench
+}
+
+fn config(flash: Vec<u8>, module: Module, dip: u8) -> Config {
+    Config {
         dip,
         module,
         chip: chip::Config::holding(flash),
         ..Config::default()
-    };
-    let mut bench = Bench::of(&BUILT.0, config);
-    // The loader's reset after a check.
-    bench.tolerant = true;
-    bench
+    }
+}
+
+/// Returns a board for a bus with several.
+pub fn made(flash: Vec<u8>, module: Module, dip: u8) -> Board {
+    let mut config = config(flash, module, dip);
+    config.layout = LAYOUT;
+    config.chip.corner = corner();
+    Board::new(&BUILT.0, config).expect("the loader fits")
 }
 
 /// Runs until the unit answers, and returns that time.
