@@ -65,6 +65,5 @@ mod silences;
 mod stack;
 mod storing;
 mod timing;
-mod update_of_a_bus;
 mod updating;
 mod upsets;
