@@ -11,7 +11,7 @@ use crate::bus::endpoint::{RATES, duration};
 use crate::export::ExportFormat;
 use crate::names::port_number;
 
-/// Finds, sets up and watches modio units over Modbus
+/// Finds, sets up, watches and updates modio units over Modbus
 #[derive(Parser, Debug)]
 #[command(name = "modioctl", version, max_term_width = 100)]
 #[command(after_help = "\

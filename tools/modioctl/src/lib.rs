@@ -1,4 +1,5 @@
-//! `modioctl`: finds, sets up and watches modio units over Modbus, on a serial port, over TCP and over Modbus TCP.
+//! `modioctl`: finds, sets up, watches and updates modio units over Modbus, on a serial port, over TCP and over Modbus
+//! TCP.
 //!
 //! The program is [`run`]. Its tests also use the modules that are public.
 

@@ -50,7 +50,7 @@ pub enum Patience {
 /// What to do next.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// Send a request to a unit, and pass its answer to [`Campaign::heard`].
+    /// Send a request to a unit, and pass its answer to [`Campaign::take_answer`].
     Ask {
         /// Address of the unit.
         unit: u8,
@@ -68,27 +68,34 @@ pub enum Step {
         /// How long the line must be idle before it, in addition to the silence between frames.
         pause: Duration,
     },
-    /// Send this to all units, and pass anything that is received to [`Campaign::heard`]: nothing should be.
+    /// Send this to all units, and pass received bytes to [`Campaign::take_answer`]. Usually nothing answers.
     Probe(Vec<u8>),
     /// Leave the line idle for this time.
     Wait(Duration),
 }
 
-/// A step with its purpose. Units are given by their index.
+/// A step with its purpose. A unit is given by its index, a block by its number.
 #[derive(Clone, Copy, Debug)]
 enum Action {
     Wait(Duration),
     Probe,
     Broadcast(usize),
+    /// Send a block to a unit.
     Block(usize, usize),
+    /// Open the lock, then give the order.
     Unlock(usize, Command),
     Order(usize, Command),
+    /// Read file 2 up to the descriptions of both images.
     Status(usize),
-    /// Asks how many have arrived of this number of blocks that the unit was missing.
+    /// Read how many blocks are missing, after this number of blocks that the unit was missing.
     Early(usize, usize),
+    /// Read how many blocks are missing.
     Short(usize),
+    /// Read which blocks are missing.
     Bits(usize),
+    /// Read version and commit.
     Identity(usize),
+    /// Read whether the image is confirmed.
     Confirmed(usize),
 }
 
@@ -168,7 +175,7 @@ impl Campaign {
         self.unicast
     }
 
-    /// Returns what to do next, or `None` at the end. Call [`Self::heard`] after each step.
+    /// Returns what to do next, or `None` at the end. Call [`Self::take_answer`] after each step.
     pub fn next_step(&mut self) -> Option<Step> {
         while self.queue.is_empty() {
             self.plan()?;

@@ -22,7 +22,7 @@ pub enum Fault {
     Restarts,
     /// It has not started the image.
     NotStarted,
-    /// It runs an image that is not the one that was sent.
+    /// It runs another image than the update sent.
     OtherImage,
     /// It has not confirmed the image.
     NotConfirmed,
@@ -50,8 +50,8 @@ impl fmt::Display for Fault {
             Self::Rejected(reason) => {
                 return write!(
                     f,
-                    "rejected the image ({}), and runs the one that it had",
-                    said(*reason)
+                    "rejected the image ({}), and runs the previous one",
+                    reason_text(*reason)
                 );
             }
             Self::Strange => {
@@ -64,10 +64,10 @@ impl fmt::Display for Fault {
                 "restarts during the update: check its supply, then run the same command again"
             }
             Self::NotStarted => {
-                "has not started the image, and runs the one that it had: run the same command again"
+                "has not started the image, and runs the previous one: run the same command again"
             }
             Self::OtherImage => {
-                "runs an image that was not sent: another program may update it; see `modioctl update --status`"
+                "runs another image than this command sent: another program may update it; see `modioctl update --status`"
             }
             Self::NotConfirmed => {
                 "runs the image, but has not confirmed it: run the same command again within 15 minutes"
@@ -77,7 +77,7 @@ impl fmt::Display for Fault {
 }
 
 /// Describes why an image was rejected.
-pub fn said(reason: Reason) -> &'static str {
+pub fn reason_text(reason: Reason) -> &'static str {
     match reason {
         Reason::Magic => "it has no header",
         Reason::Board => "it is for another board",

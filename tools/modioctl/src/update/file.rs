@@ -165,7 +165,7 @@ fn image(bytes: &[u8], slot: Slot) -> Result<(&'static Board, Image), String> {
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use super::super::sample::{file, image, sealed};
+    use super::super::tests::sample::{file, image, sealed};
     use super::*;
 
     /// Returns the file of a modio-02 whose images have this number of blocks.

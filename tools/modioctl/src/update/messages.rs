@@ -120,12 +120,12 @@ pub(super) fn order(command: u16) -> Vec<u8> {
     pdu(6, COMMAND, command)
 }
 
-/// Returns the request for the registers that say what runs.
+/// Returns the request for the registers with version and commit of the running image.
 pub(super) fn read_identity() -> Vec<u8> {
     pdu(3, FIRMWARE_VERSION, IDENTITY)
 }
 
-/// Returns whether the registers that say what runs are those of an image.
+/// Returns whether version and commit in the registers are those of an image.
 pub(super) fn is_identity(answer: &[u8], image: &[u16; 8]) -> bool {
     let words = words_of(answer);
     let [version, patch, _, high, low, ..] = *image;

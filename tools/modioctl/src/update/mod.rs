@@ -11,16 +11,10 @@ mod messages;
 mod unit;
 
 #[cfg(test)]
-mod bus;
-#[cfg(test)]
-mod campaign_tests;
-#[cfg(test)]
-mod model;
-#[cfg(test)]
-mod sample;
+mod tests;
 
 pub use campaign::{Campaign, Patience, Step};
-pub use fault::{Fault, said};
+pub use fault::{Fault, reason_text};
 pub use file::{File, Image};
 pub use messages::{Status, read_status};
 pub use unit::{Stage, Unit};

@@ -5,8 +5,11 @@ use register_map::update::{Reason, Slot, State};
 
 use super::{Fault, Status};
 
-/// Number of requests in a row without an answer after which a unit is given up, and of those after a restart.
-const SILENCES: u8 = 3;
+/// Number of requests in a row without an answer after which a unit is given up. Two of them are sent with little
+/// patience, the others repeated as often as the line says.
+const SILENCES: u8 = 4;
+/// Number of polls while a unit erases, 200 ms and more apart: ten times as long as it needs.
+const ERASE_POLLS: u8 = 150;
 /// Number of polls after a restart, half a second and more apart, until the image must run.
 const RESTART_POLLS: u8 = 60;
 /// Number of such polls that show the state before an order, after which the order is given again: its answer may have
@@ -24,7 +27,7 @@ const ROUNDS: u8 = 10;
 /// How far a unit is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// It must be told to prepare.
+    /// It needs the order to prepare.
     Waiting,
     /// It erases the slot that does not run.
     Erasing,
@@ -59,6 +62,8 @@ pub struct Unit {
     pub(super) missing: Vec<bool>,
     /// Whether `missing` is what the unit has reported since the last block.
     pub(super) is_known: bool,
+    /// Number of missing blocks in its last report.
+    reported: usize,
     /// Whether it was prepared before this program started, perhaps over another line.
     was_prepared: bool,
     silences: u8,
@@ -79,6 +84,7 @@ impl Unit {
             starts: Command::Finish,
             missing: vec![true; image[5].into()],
             is_known: false,
+            reported: image[5].into(),
             was_prepared: stage == Stage::Receiving,
             silences: 0,
             orders: 0,
@@ -187,15 +193,15 @@ impl Unit {
 
     /// Takes the state while the unit erases.
     pub(super) fn erases(&mut self, status: &Status) {
-        if status.pages == 0 {
-            if status.state == Some(State::Receiving) {
-                self.stage = Stage::Receiving;
-                self.missing.fill(true);
-                self.is_known = true;
-                self.was_prepared = false;
-            } else {
-                self.stage = Stage::Waiting;
-            }
+        if status.pages > 0 {
+            self.poll(ERASE_POLLS, Fault::NoProgress);
+        } else if status.state == Some(State::Receiving) {
+            self.stage = Stage::Receiving;
+            self.all_missing();
+            self.is_known = true;
+            self.was_prepared = false;
+        } else {
+            self.stage = Stage::Waiting;
         }
     }
 
@@ -228,13 +234,19 @@ impl Unit {
         any
     }
 
-    /// Notes the missing blocks, and whether there are fewer.
+    fn all_missing(&mut self) {
+        self.missing.fill(true);
+        self.reported = self.missing.len();
+    }
+
+    /// Notes the missing blocks, and whether there are fewer than in the last report.
     fn is_missing(&mut self, block: impl Fn(usize) -> bool) {
-        let before = self.lacks();
         let blocks = self.missing.iter_mut().enumerate();
         blocks.for_each(|(n, missing)| *missing = block(n));
         self.is_known = true;
-        if self.lacks() < before || before == 0 {
+        let before = self.reported;
+        self.reported = self.lacks();
+        if self.reported < before {
             self.rounds = 0;
         } else if std::mem::take(&mut self.was_prepared) {
             // Perhaps for another line, whose blocks alone it takes.
@@ -274,7 +286,7 @@ impl Unit {
             // The CRC-32 is wrong, and all blocks count as missing.
             Some(State::Receiving) if status.missing > 0 => {
                 self.again(Fault::Rejected(Reason::Crc));
-                self.missing.fill(true);
+                self.all_missing();
                 self.is_known = false;
             }
             // It has restarted without the order, which lost what it had received.

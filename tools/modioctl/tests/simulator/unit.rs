@@ -21,6 +21,11 @@ fn path(variable: &str) -> PathBuf {
         .into()
 }
 
+/// Returns the path of the file of an update.
+pub fn update_file() -> PathBuf {
+    path("MODIO_UPDATE")
+}
+
 impl Unit {
     /// Starts a modio-02 with this address and this module in its slot; nothing is stored yet.
     pub fn start(address: u8, module: &str) -> Self {
@@ -38,10 +43,23 @@ impl Unit {
         Self::run(&options)
     }
 
+    /// Starts a modio-02 with address 1, which has a loader and runs the image of the [`update_file`] for slot A.
+    pub fn with_loader() -> Self {
+        let (loader, image) = (path("MODIO_LOADER"), update_file());
+        let files = [("--loader", loader), ("--image", image)];
+        Self::start_with(&files, &["--module", "4di"])
+    }
+
     fn run(options: &[&str]) -> Self {
-        let mut simulator = Command::new(path("MODIO_SIM"))
-            .arg("--elf")
-            .arg(path("MODIO_ELF"))
+        Self::start_with(&[("--elf", path("MODIO_ELF"))], options)
+    }
+
+    fn start_with(files: &[(&str, PathBuf)], options: &[&str]) -> Self {
+        let mut simulator = Command::new(path("MODIO_SIM"));
+        for (option, file) in files {
+            simulator.arg(option).arg(file);
+        }
+        let mut simulator = simulator
             .args(["--tcp", "127.0.0.1:0", "--http", "127.0.0.1:0"])
             .args(options)
             .stdout(Stdio::piped())

@@ -1,4 +1,4 @@
-//! `update`, with units that the test serves.
+//! `update`, with units that the test serves, and with the loader and the image in the simulator.
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -13,12 +13,13 @@ use register_map::update::{Slot, State};
 
 use crate::program::{At, has};
 use crate::served::{modio_02, response, serve_requests, server};
+use crate::unit::{Unit, update_file};
 
 #[allow(dead_code, reason = "the tests of the plan use the rest")]
-#[path = "../../src/update/model.rs"]
+#[path = "../../src/update/tests/model.rs"]
 mod model;
 #[allow(dead_code, reason = "the tests of the file use the rest")]
-#[path = "../../src/update/sample.rs"]
+#[path = "../../src/update/tests/sample.rs"]
 mod sample;
 
 use model::{Flaw, Model};
@@ -38,6 +39,11 @@ struct Line {
 impl Line {
     /// Serves units 1 to `count`, after a change of each.
     fn new(count: u8, change: impl FnMut(&mut Model)) -> Self {
+        Self::with_echo(count, change, false)
+    }
+
+    /// The same, with an adapter that may return what it sends.
+    fn with_echo(count: u8, change: impl FnMut(&mut Model), echo: bool) -> Self {
         let mut units: Vec<_> = (1..=count).map(Model::new).collect();
         for unit in &mut units {
             unit.page = Duration::from_millis(2);
@@ -46,7 +52,7 @@ impl Line {
         units.iter_mut().for_each(change);
         let units = Arc::new(Mutex::new(units));
         let written = Arc::default();
-        let at = At::tcp(serve(&units, &written));
+        let at = At::tcp(serve(&units, &written, echo));
         let folder = tempfile::tempdir().unwrap();
         Self {
             units,
@@ -79,7 +85,11 @@ impl Line {
     }
 }
 
-fn serve(units: &Arc<Mutex<Vec<Model>>>, written: &Arc<Mutex<Vec<Vec<u8>>>>) -> SocketAddr {
+fn serve(
+    units: &Arc<Mutex<Vec<Model>>>,
+    written: &Arc<Mutex<Vec<Vec<u8>>>>,
+    echo: bool,
+) -> SocketAddr {
     let (units, written) = (Arc::clone(units), Arc::clone(written));
     let begin = Instant::now();
     let mut server = server(modio_02(Module::Di4));
@@ -91,15 +101,23 @@ fn serve(units: &Arc<Mutex<Vec<Model>>>, written: &Arc<Mutex<Vec<Vec<u8>>>>) -> 
         let first = u16::from_be_bytes([pdu[1], pdu[2]]);
         let is_points =
             pdu[0] == 1 || (pdu[0] == 3 && ![FIRMWARE_VERSION, UPDATE].contains(&first));
+        let mut bytes = match echo {
+            true => Framing::Rtu.frame(0, unit, pdu),
+            false => Vec::new(),
+        };
         if is_points && units.iter().any(|known| known.address == unit) {
-            return Some(response(&mut server, unit, pdu));
+            bytes.extend(response(&mut server, unit, pdu));
+            return Some(bytes);
         }
         let answers = units
             .iter_mut()
             .filter_map(|known| known.take(unit, pdu, begin.elapsed()));
         // All units take a broadcast.
         let answer = answers.collect::<Vec<_>>().pop();
-        Some(answer.map_or(Vec::new(), |pdu| Framing::Rtu.frame(0, unit, &pdu)))
+        if let Some(answer) = answer {
+            bytes.extend(Framing::Rtu.frame(0, unit, &answer));
+        }
+        Some(bytes)
     })
 }
 
@@ -131,6 +149,19 @@ fn units_are_updated_together_and_again_only_when_it_is_forced() {
     assert_eq!(json["units"][0]["slot"], "A");
     assert_eq!(json["units"][0]["result"], "confirmed");
     assert!(json["seconds"]["blocks"].as_f64().unwrap() > 0.1, "{json}");
+}
+
+#[test]
+fn blocks_are_broadcast_unless_something_answers_and_an_echo_is_no_answer() {
+    let answers = |unit: &mut Model| unit.flaw = Flaw::AnswersBroadcasts;
+    for (line, alone) in [
+        (Line::with_echo(2, |_| (), true), false),
+        (Line::new(2, answers), true),
+    ] {
+        let text = line.run("update FILE --units 1-2").fine();
+        has(&text, &["unit 1: 0.1.2", "unit 2: 0.1.2"]);
+        assert_eq!(text.contains("to each unit alone"), alone, "{text}");
+    }
 }
 
 #[test]
@@ -243,4 +274,35 @@ fn status_shows_both_slots_and_the_way_back_exchanges_them() {
         &["unit 1: 0.1.2 (00030004) -> 1.0.7 (aaaabbbb) in slot B, confirmed"],
     );
     assert_eq!(line.blocks(), 0);
+}
+
+#[test]
+#[ignore = "needs the simulator: cargo xtask test"]
+fn a_unit_takes_the_image_for_its_other_slot_and_goes_back() {
+    let unit = Unit::with_loader();
+    let at = At::port(unit.pty.display());
+    at.run("config set BAUD=115200").fine();
+    at.run("config save").fine();
+    at.run("reboot").fine();
+    let run = |words: &str| at.run(&format!("--baud 115200 update {words}")).fine();
+    let file = update_file();
+    let file = file.display();
+    has(
+        &run(&file.to_string()),
+        &["in slot A, it runs that already"],
+    );
+    let text = run(&format!("{file} --force --poll p5.1"));
+    has(
+        &text,
+        &[
+            "p5.1 off",
+            "unit 1: ",
+            "in slot B, confirmed",
+            " blocks sent for ",
+        ],
+    );
+    has(&run("--status"), &["1     modio-02  B     "]);
+    has(&run("--back"), &["in slot A, confirmed"]);
+    let text = at.run("--baud 115200 info").fine();
+    has(&text, &["slot A runs, confirmed; slot B confirmed"]);
 }

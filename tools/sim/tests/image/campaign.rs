@@ -30,6 +30,8 @@ struct Line {
     /// Beginning of the first block, end of the last one.
     blocks: Option<(Time, Time)>,
     last: Time,
+    /// After this number of blocks the first board loses its supply for a moment.
+    cut_after: Option<usize>,
 }
 
 impl Line {
@@ -57,6 +59,7 @@ impl Line {
             polled: [0; 2],
             blocks: None,
             last: Time::ZERO,
+            cut_after: None,
         };
         line.bus.line().set_settings(line.settings);
         line.bus.run_for(CHECK + START);
@@ -164,7 +167,14 @@ impl Line {
                 let (first, _) = self.blocks.unwrap_or((begins, begins));
                 self.blocks = Some((first, self.bus.now()));
             }
-            campaign.heard(answer.as_deref());
+            if self
+                .cut_after
+                .is_some_and(|blocks| campaign.blocks().0 >= blocks)
+            {
+                self.cut_after = None;
+                self.bus.cycle(0);
+            }
+            campaign.take_answer(answer.as_deref());
         }
     }
 
@@ -229,4 +239,13 @@ fn bit_errors_delay_an_update_and_do_not_stop_it() {
     line.errors = 10_000;
     let ratio = line.update();
     assert!(ratio < 2.0, "{ratio}");
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_unit_that_loses_its_supply_in_an_update_begins_again() {
+    let mut line = Line::new(Baud::B115200, 2);
+    line.cut_after = Some(200);
+    let ratio = line.update();
+    assert!(ratio < 4.0, "{ratio}");
 }

@@ -104,7 +104,7 @@ impl Drive<'_> {
                     patience,
                 } => self.ask(unit, &pdu, patience).await?,
             };
-            campaign.heard(answer.as_deref());
+            campaign.take_answer(answer.as_deref());
             let (all, _) = campaign.blocks();
             if all > sent {
                 sent = all;

@@ -106,7 +106,10 @@ impl Found {
             Some(State::Trial(_)) => format!("{version}, on trial"),
             Some(State::Confirmed) => format!("{version}, confirmed"),
             Some(State::Rejected(reason)) => {
-                format!("{version}, rejected: {}", crate::update::said(reason))
+                format!(
+                    "{version}, rejected: {}",
+                    crate::update::reason_text(reason)
+                )
             }
         }
     }
@@ -171,7 +174,7 @@ impl Found {
         } = &self.status;
         if self.trial {
             return Err(
-                "runs an image on trial: it goes back by itself unless the image is confirmed, after 15 minutes at most"
+                "runs an image on trial: unless the image is confirmed, the unit goes back automatically within 15 minutes"
                     .to_owned(),
             );
         }

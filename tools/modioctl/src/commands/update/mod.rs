@@ -48,7 +48,7 @@ pub async fn run(
     }
     if options.status {
         show(&found, json)?;
-        return all(failed);
+        return report_all(failed);
     }
     let mut units = Vec::new();
     for unit in &found {
@@ -96,7 +96,7 @@ pub async fn run(
     }
     note.borrow_mut().clear();
     report(&found, &ended, &transfers, device.master.endpoint(), json)?;
-    all(ended.iter().filter_map(failure).collect())
+    report_all(ended.iter().filter_map(failure).collect())
 }
 
 /// Returns the failure of a unit that was not updated.
@@ -134,8 +134,8 @@ fn refuse(failed: &[Failure]) -> Result<(), Failure> {
     })
 }
 
-/// Reports each failure on a line of its own. Fails with the last one.
-fn all(mut failed: Vec<Failure>) -> Result<(), Failure> {
+/// Reports each failure on a separate line. Fails with the last one.
+fn report_all(mut failed: Vec<Failure>) -> Result<(), Failure> {
     // The exit status is 1 if any unit refuses.
     failed.sort_by_key(|failure| std::cmp::Reverse(failure.status()));
     let last = failed.pop();

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 
-use crate::update::{Campaign, Stage};
+use crate::update::{Campaign, Stage, Unit};
 
 /// The bars. Nothing is drawn when standard error is no terminal.
 #[derive(Default)]
@@ -41,7 +41,8 @@ impl Progress {
     pub fn show(&self, campaign: &Campaign) {
         let (sent, left) = campaign.blocks();
         if let Some(line) = &self.line {
-            line.set_length((sent + left) as u64);
+            let image = campaign.units().iter().map(Unit::blocks).max();
+            line.set_length((sent + left).max(image.unwrap_or_default()) as u64);
             line.set_position(sent as u64);
         }
         for (bar, unit) in self.units.iter().zip(campaign.units()) {

@@ -114,7 +114,13 @@ pub fn report(
     if json {
         let units = rows.iter().map(|(unit, before, after, slot, result)| {
             let (slot, result) = (format!("{slot:?}"), *result);
-            json!({"unit": unit, "before": before, "after": after, "slot": slot, "result": result})
+            let failure = ended.iter().find_map(|ended| match ended.stage {
+                Stage::Failed(fault) if ended.address == *unit => Some(fault.to_string()),
+                _ => None,
+            });
+            json!({
+                "unit": unit, "before": before, "after": after, "slot": slot, "result": result, "failure": failure,
+            })
         });
         let seconds = json!({"prepare": prepare, "blocks": blocks, "restart": restart});
         return output::json(&json!({"units": units.collect::<Json>(), "seconds": seconds}));

@@ -1,6 +1,7 @@
 //! What the answers of units mean for the plan.
 
 use register_map::codes::Command;
+use register_map::update::State;
 
 use super::{Action, Campaign, PROGRAMMING, SLOWER, SLOWEST};
 use crate::update::messages;
@@ -8,7 +9,7 @@ use crate::update::{Fault, Stage, Status};
 
 impl Campaign {
     /// Takes what followed a step: the answer of a unit, or whatever was received after a probe.
-    pub fn heard(&mut self, answer: Option<&[u8]>) {
+    pub fn take_answer(&mut self, answer: Option<&[u8]>) {
         let Some(action) = self.pending.take() else {
             return;
         };
@@ -117,9 +118,13 @@ impl Campaign {
             },
             (Action::Early(_, sent), Some(status)) => {
                 let before = unit.lacks();
-                if status.blocks == 0 && status.reason == 0 {
+                if status.state != Some(State::Receiving) {
+                    unit.reports(&status);
+                } else if status.blocks == 0 && status.reason == 0 {
                     self.send_to_each();
-                } else if usize::from(status.missing) + sent > before + sent / 4 {
+                } else if usize::from(status.missing) + sent > before + sent / 4
+                    && self.pause < SLOWEST
+                {
                     self.pause = (2 * self.pause + SLOWER).min(SLOWEST);
                     self.queue.clear();
                 }

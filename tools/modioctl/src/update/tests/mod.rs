@@ -1,13 +1,19 @@
+//! Tests of the plan with models of units on a line.
+
+mod bus;
+mod model;
+pub(super) mod sample;
+
 use register_map::update::{Reason, Slot, State};
 
-use super::bus::Bus;
 use super::file::File;
 use super::file::tests::of_blocks;
-use super::model::Flaw;
-use super::{Campaign, Fault, Stage, Unit};
+use super::{Campaign, Fault, Stage, Step, Unit};
+use bus::Bus;
+use model::Flaw;
 
-/// Blocks of the image: 45 KiB, the largest that a modio-02 has.
-const BLOCKS: usize = 360;
+/// Blocks of the image: about as many as that of a modio-02 has.
+const BLOCKS: usize = 420;
 
 /// Runs whose times are averaged.
 const RUNS: u64 = 10;
@@ -70,7 +76,6 @@ fn bit_errors_cost_what_is_missing_anywhere() {
                 bus.ratio(BLOCKS)
             });
             let ratio = ratios.sum::<f64>() / RUNS as f64;
-            println!("{errors:?} {baud} {ratio}");
             assert!(ratio <= most, "{errors:?} at {baud} bit/s: {ratio:.3}");
         }
     }
@@ -125,9 +130,11 @@ fn a_unit_that_restarts_begins_again_and_one_that_is_gone_does_not_hold_up_the_o
     let mut bus = Bus::new(115_200, 4);
     bus.units[1].flaw = Flaw::RestartsAfter(100);
     bus.units[2].flaw = Flaw::GoneAfter(200);
+    bus.units[3].flaw = Flaw::RestartsAfter(20);
     let campaign = update(&mut bus, false);
     let (done, gone) = (Stage::Done, Stage::Failed(Fault::Silent));
     assert_eq!(stages(&campaign), [done, done, gone, done]);
+    assert!(!campaign.is_unicast());
     let (sent, _) = campaign.blocks();
     assert!(sent < 2 * BLOCKS + 10, "{sent}");
 }
@@ -195,4 +202,64 @@ fn the_way_back_needs_no_blocks_and_is_confirmed() {
     assert_eq!(stages(&campaign), [Stage::Done, other]);
     assert_eq!(campaign.blocks(), (0, 0));
     assert_eq!([0, 1].map(|unit| bus.units[unit].trial), [false, true]);
+}
+
+/// Returns an answer to this request with these words; for some values of `kind` none, an exception or anything.
+fn false_answer(
+    random: &mut fastrand::Rng,
+    pdu: &[u8],
+    words: &[u16],
+    kind: u8,
+) -> Option<Vec<u8>> {
+    match kind {
+        0 => None,
+        1 => Some(vec![pdu[0] | 0x80, random.u8(0..8)]),
+        2 => Some((0..random.usize(0..8)).map(|_| random.u8(..)).collect()),
+        _ if matches!(pdu[0], 6 | 0x15) => Some(pdu.to_vec()),
+        _ => {
+            let mut answer = vec![pdu[0], 0];
+            answer.extend([0, 6].iter().filter(|_| pdu[0] == 0x14));
+            let count = usize::from(pdu[pdu.len() - 1]);
+            answer.extend(words[..count].iter().flat_map(|word| word.to_be_bytes()));
+            Some(answer)
+        }
+    }
+}
+
+#[test]
+fn false_answers_end_the_plan() {
+    let file = of_blocks(20);
+    let image = file.image(Slot::B);
+    let mut random = fastrand::Rng::with_seed(1);
+    for run in (0..=99).cycle().take(4000) {
+        let stages = [
+            Stage::Waiting,
+            Stage::Receiving,
+            Stage::Restarting,
+            Stage::OnTrial,
+        ];
+        let units = (1..4).map(|unit| {
+            let stage = random.choice(stages).unwrap();
+            Unit::new(unit, Slot::B, image.words, stage)
+        });
+        let units = units.collect();
+        let mut campaign = Campaign::new(&image.blocks, units, random.bool());
+        let word = || random.choice([0, 1, 2, 3, 5, 6, 20, 0xFFFF]).unwrap();
+        let words: Vec<_> = std::iter::repeat_with(word).take(24).collect();
+        let mut steps = 0;
+        while let Some(step) = campaign.next_step() {
+            let answer = match step {
+                Step::Ask { pdu, .. } => {
+                    // In half of the runs a unit always says the same.
+                    let kind = random.u8(0..30) + 30 * (run % 2);
+                    false_answer(&mut random, &pdu, &words, kind)
+                }
+                Step::Probe(_) => random.bool().then(|| vec![1]),
+                _ => None,
+            };
+            campaign.take_answer(answer.as_deref());
+            steps += 1;
+            assert!(steps < 50_000, "run {run}: {:?}", campaign.units());
+        }
+    }
 }

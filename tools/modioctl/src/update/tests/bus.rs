@@ -6,7 +6,7 @@ use modbus_line::{Format, LineFormat, t35};
 use register_map::update::BLOCK_BYTES;
 
 use super::model::Model;
-use super::{Campaign, Patience, Step};
+use crate::update::{Campaign, Patience, Step};
 
 /// Time for which the master waits for an answer as usual, three times.
 const USUAL: Duration = Duration::from_secs(1);
@@ -129,7 +129,7 @@ impl Bus {
             let (first, _) = self.blocks.unwrap_or((begins, begins));
             self.blocks = Some((first, self.now));
         }
-        campaign.heard(answer.as_deref());
+        campaign.take_answer(answer.as_deref());
         true
     }
 
