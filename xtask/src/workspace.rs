@@ -24,6 +24,8 @@ pub struct Workspace {
     pub install: bool,
     /// Whether host tests leave out the simulator.
     pub host: bool,
+    /// The file with the public keys that the loader trusts, if not those of `loader/build.rs`.
+    pub keys: Option<PathBuf>,
 }
 
 impl Workspace {
