@@ -182,12 +182,13 @@ impl Options {
             return Ok(());
         };
         let options = (OPTION_BYTES, PROTECTED.to_vec());
-        // The option bytes last: the part is reset when they are written.
+        // The option bytes last, and not verified: the part is reset when they are written.
         for (address, bytes) in regions.iter().chain(self.protect.then_some(&options)) {
             let file = workspace.target.join("flash.bin");
             fs::write(&file, bytes)?;
             let mut write = Command::new("stm32flash");
-            write.args(["-f", "-v", "-S", &format!("{address:#x}:{}", bytes.len())]);
+            write.args(["-f", "-S", &format!("{address:#x}:{}", bytes.len())]);
+            write.args((*address != OPTION_BYTES).then_some("-v"));
             command::run(write.arg("-w").arg(file).arg(port))?;
         }
         say!("written and verified: set BOOT0 low and reset the board");
