@@ -134,13 +134,20 @@ pub fn program(
     // The variables that firmware/build.rs and loader/build.rs read.
     cargo.envs(map.map(|map| ("MODIO_MAP", map)));
     cargo.envs(workspace.keys.as_ref().map(|keys| ("MODIO_KEYS", keys)));
+    // Cargo gives every application the same name. Only the image that runs alone keeps it.
+    let alone = target.join(TARGET).join(PROFILE).join("modio");
+    let aside = alone.with_file_name("modio-aside");
+    if slot.is_some() && alone.exists() {
+        fs::rename(&alone, &aside)?;
+    }
     let artifacts = workspace::artifacts(&mut cargo)?;
     let mut elf = workspace::executable(&artifacts, name)?;
     if let Some(letter) = slot {
-        // Leave no image for a slot under the name of the image that runs alone.
-        let kept = elf.with_file_name(format!("modio-{letter}"));
-        fs::rename(&elf, &kept)?;
-        elf = kept;
+        elf.set_file_name(format!("modio-{letter}"));
+        fs::rename(&alone, &elf)?;
+        if aside.exists() {
+            fs::rename(&aside, &alone)?;
+        }
     }
     let bytes = image::read(&elf)?;
     let flash = image::flat(&bytes, board.memory().part.flash)?;
