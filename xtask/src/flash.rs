@@ -9,7 +9,7 @@ use std::process::Command;
 
 use anyhow::{Context as _, Result, anyhow, ensure};
 use fs_err as fs;
-use register_map::layout::TwoPages;
+use register_map::layout::{HEADER, TwoPages};
 use register_map::part::FLASH_BASE;
 use register_map::update::{Header, Slot};
 use register_map::{Board, record};
@@ -41,8 +41,11 @@ pub struct Options {
     #[arg(long, value_name = "LETTER", value_parser = build::slot, default_value = "a")]
     slot: Slot,
 
+    #[command(flatten)]
+    signature: signed::How,
+
     /// Write the image that runs without a loader. `--elf` writes such an image, too
-    #[arg(long, conflicts_with = "slot")]
+    #[arg(long, conflicts_with_all = ["slot", "key", "epoch"])]
     plain: bool,
 
     /// Write through the ROM loader of the part at this serial port, with stm32flash: an adapter for 3.3 V at PA9 and
@@ -99,10 +102,12 @@ fn settings(
     if from == to {
         return Ok(None);
     }
-    let mut holds_loader = false;
-    for slot in layout.slots {
-        holds_loader |= Header::of(&read(slot, register_map::layout::HEADER)?).is_ok();
-    }
+    let [a, b] = layout.slots.map(|slot| {
+        let header = read(slot, HEADER)?;
+        Ok::<_, anyhow::Error>(Header::of(&header).is_ok())
+    });
+    // A part without a loader may be smaller, so that there is nothing to read at slot B.
+    let holds_loader = a? || b.unwrap_or(false);
     let TwoPages { first, bytes } = from;
     if holds_loader != is_alone {
         return Ok(None);
@@ -149,7 +154,8 @@ impl Options {
             return Ok((vec![(FLASH_BASE, bytes)], entry));
         }
         let (loader, entry) = flat(&build::loader(workspace, board)?)?;
-        let image = signed::image(workspace, &signed::Options::of(board), self.slot)?;
+        let signed = signed::Options::signed(board, self.signature.clone());
+        let image = signed::image(workspace, &signed, self.slot)?;
         Ok((loaded(board, self.slot, loader, fs::read(image)?), entry))
     }
 

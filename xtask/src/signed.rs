@@ -35,9 +35,9 @@ pub struct Options {
 }
 
 /// How an image is signed.
-#[derive(clap::Args, Debug, Default)]
+#[derive(clap::Args, Clone, Debug, Default)]
 #[group(skip)]
-struct How {
+pub struct How {
     /// Private key, 64 hexadecimal digits; without it the development key, which everybody has
     #[arg(long, value_name = "FILE")]
     key: Option<PathBuf>,
@@ -65,9 +65,14 @@ pub struct Again {
 impl Options {
     /// Returns the options for a board, with the development key.
     pub fn of(board: &'static Board) -> Self {
+        Self::signed(board, How::default())
+    }
+
+    /// Returns the options for a board, with this key and epoch.
+    pub fn signed(board: &'static Board, signature: How) -> Self {
         Self {
             build: build::Options { board },
-            signature: How::default(),
+            signature,
             output: None,
         }
     }
