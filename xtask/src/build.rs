@@ -1,5 +1,5 @@
-//! `cargo xtask build`: the release image, as an ELF file for a debugger or the simulator and as a .bin for a
-//! programmer. For tests also the loader, and the applications for the slots behind it.
+//! `cargo xtask build`: the loader, the application for both slots behind it, the file of an update, and the image that
+//! runs without a loader. Each is an ELF file for a debugger or the simulator, and a .bin for a programmer.
 
 use std::path::{Path, PathBuf};
 
@@ -11,9 +11,9 @@ use register_map::board::MODIO_02;
 use register_map::update::Slot;
 
 use crate::error::usage;
-use crate::image;
 use crate::toolchain::TARGET;
 use crate::workspace::{self, Workspace};
+use crate::{image, signed};
 
 /// The profile of the root Cargo.toml that the image is built with.
 pub const PROFILE: &str = "firmware";
@@ -40,6 +40,11 @@ pub struct Given {
 }
 
 impl Given {
+    /// Returns whether the option names an image.
+    pub fn is_given(&self) -> bool {
+        self.elf.is_some()
+    }
+
     pub fn board(&self) -> &'static Board {
         self.options.board
     }
@@ -56,80 +61,109 @@ impl Given {
     }
 }
 
+/// A program of a board.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Program {
+    /// The loader.
+    Loader,
+    /// The application, linked for a slot behind the loader.
+    Slot(Slot),
+    /// The application, linked to run without a loader.
+    Alone,
+}
+
+/// A program that was built.
+pub struct Built {
+    /// Its ELF file, with symbols and debug information. A .bin with the flash from 0x0800_0000 on is beside it.
+    pub elf: PathBuf,
+    /// The packages that were compiled for the target.
+    pub packages: Vec<PackageId>,
+}
+
 /// `cargo xtask build`.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
-    let elf = image(workspace, options.board)?;
-    say!("{}\n{}", elf.display(), elf.with_extension("bin").display());
+    for file in all(workspace, options.board)? {
+        say!("{}", file.display());
+    }
     Ok(())
 }
 
-/// Builds every program of a board: the loader, the application for both slots, and the image that runs alone.
-pub fn all(workspace: &mut Workspace, board: &Board) -> Result<()> {
-    loader(workspace, board)?;
-    for slot in Slot::ALL {
-        self::slot(workspace, board, slot)?;
-    }
-    image(workspace, board).map(drop)
+/// Builds every program of a board, and returns the files: the loader, the application for both slots, the file of an
+/// update that has them, signed with the development key, and the image that runs alone.
+pub fn all(workspace: &mut Workspace, board: &'static Board) -> Result<Vec<PathBuf>> {
+    let loader = loader(workspace, board)?;
+    let ([a, b], update) = signed::update(workspace, &signed::Options::of(board))?;
+    let slots = [a, b].map(|image| image.with_extension(""));
+    let alone = image(workspace, board)?;
+    let bin = alone.with_extension("bin");
+    Ok([vec![loader], slots.into(), vec![update, alone, bin]].concat())
 }
 
-/// Builds the image, and returns its ELF file, with symbols and debug information.
+/// Builds the image that runs without a loader, and returns its ELF file.
 pub fn image(workspace: &mut Workspace, board: &Board) -> Result<PathBuf> {
-    Ok(linked(workspace, board, None)?.0)
+    Ok(program(workspace, board, Program::Alone, None)?.elf)
 }
 
 /// Builds the loader, and returns its ELF file.
 pub fn loader(workspace: &mut Workspace, board: &Board) -> Result<PathBuf> {
-    Ok(program(workspace, board, ["loader", "loader", board.name], None)?.0)
+    Ok(program(workspace, board, Program::Loader, None)?.elf)
 }
 
-/// Builds the application for a slot behind the loader, and returns its ELF file.
-pub fn slot(workspace: &mut Workspace, board: &Board, slot: Slot) -> Result<PathBuf> {
-    let letter = match slot {
-        Slot::A => "a",
-        Slot::B => "b",
+/// Builds a program for a board, and writes the linker's map to a file. Checks that it cannot panic and that its code in
+/// RAM needs no flash. Writes the flash from 0x0800_0000 on to a .bin.
+pub fn program(
+    workspace: &mut Workspace,
+    board: &Board,
+    program: Program,
+    map: Option<&Path>,
+) -> Result<Built> {
+    let (package, name, slot) = match program {
+        Program::Loader => ("loader", "loader", None),
+        Program::Slot(Slot::A) => ("firmware", "modio", Some("a")),
+        Program::Slot(Slot::B) => ("firmware", "modio", Some("b")),
+        Program::Alone => ("firmware", "modio", None),
     };
-    let features = format!("{board},slot-{letter}");
-    let (elf, _) = program(workspace, board, ["firmware", "modio", &features], None)?;
-    // Leave no image for a slot under the name of the image that runs alone.
-    let kept = elf.with_file_name(format!("modio-{letter}"));
-    fs::rename(&elf, &kept)?;
-    fs::rename(elf.with_extension("bin"), kept.with_extension("bin"))?;
-    Ok(kept)
-}
-
-/// Builds the image that runs without a loader, and writes the linker's map to a file. Returns the ELF file, and the
-/// packages that were compiled for the target.
-pub fn linked(
-    workspace: &mut Workspace,
-    board: &Board,
-    map: Option<&Path>,
-) -> Result<(PathBuf, Vec<PackageId>)> {
-    program(workspace, board, ["firmware", "modio", board.name], map)
-}
-
-/// Builds a program for a board: its package, its name, and the features. Checks that it cannot panic and that its code
-/// in RAM needs no flash. Writes the flash from 0x0800_0000 on to a .bin.
-fn program(
-    workspace: &mut Workspace,
-    board: &Board,
-    [package, name, features]: [&str; 3],
-    map: Option<&Path>,
-) -> Result<(PathBuf, Vec<PackageId>)> {
     let target = target(&workspace.target, board);
     let mut cargo = workspace.target_cargo("build")?;
     cargo.args(["--profile", PROFILE, "--package", package]);
-    cargo.args(["--bin", name, "--features", features]);
+    cargo.args(["--bin", name, "--features", board.name]);
+    if let Some(letter) = slot {
+        cargo.args(["--features", &format!("slot-{letter}")]);
+    }
     cargo.arg("--target-dir").arg(&target);
-    // The variable that firmware/build.rs reads.
+    // The variables that firmware/build.rs and loader/build.rs read.
     cargo.envs(map.map(|map| ("MODIO_MAP", map)));
+    cargo.envs(workspace.keys.as_ref().map(|keys| ("MODIO_KEYS", keys)));
+    // Cargo gives every application the same name. Only the image that runs alone keeps it.
+    let alone = target.join(TARGET).join(PROFILE).join("modio");
+    let aside = alone.with_file_name("modio-aside");
+    if slot.is_some() && alone.exists() {
+        fs::rename(&alone, &aside)?;
+    }
     let artifacts = workspace::artifacts(&mut cargo)?;
-    let elf = workspace::executable(&artifacts, name)?;
+    let mut elf = workspace::executable(&artifacts, name)?;
+    if let Some(letter) = slot {
+        elf.set_file_name(format!("modio-{letter}"));
+        fs::rename(&alone, &elf)?;
+        if aside.exists() {
+            fs::rename(&aside, &alone)?;
+        }
+    }
     let bytes = image::read(&elf)?;
     let flash = image::flat(&bytes, board.memory().part.flash)?;
     image::check(&bytes)?;
     fs::write(elf.with_extension("bin"), flash)?;
     let packages = workspace::packages(&artifacts, &target.join(TARGET));
-    Ok((elf, packages))
+    Ok(Built { elf, packages })
+}
+
+/// Parses the letter of a slot.
+pub fn slot(letter: &str) -> Result<Slot, String> {
+    match letter {
+        "a" | "A" => Ok(Slot::A),
+        "b" | "B" => Ok(Slot::B),
+        _ => Err("a slot is a or b".to_owned()),
+    }
 }
 
 /// Returns the target directory of a board. The images have the same name, so each board has a separate directory:

@@ -1,5 +1,5 @@
-//! `cargo xtask flash`, `run`, `attach` and `gdb`: the image on the board at a debug probe, through probe-rs. Without a
-//! probe, `run` and `gdb` use the simulator.
+//! `cargo xtask run`, `attach` and `gdb`: the image that runs without a loader, on the board at a debug probe, through
+//! probe-rs. Without a probe, `run` and `gdb` use the simulator.
 
 use std::ffi::OsString;
 use std::io;
@@ -21,7 +21,7 @@ const GDBS: [&str; 3] = ["arm-none-eabi-gdb", "gdb-multiarch", "gdb"];
 #[group(skip)]
 pub struct Options {
     #[command(flatten)]
-    given: build::Given,
+    pub given: build::Given,
 
     /// The part, as `probe-rs chip list` names it [default: that of the board]
     #[arg(long, value_name = "CHIP")]
@@ -46,16 +46,6 @@ pub struct GdbOptions {
     /// Arguments for GDB, such as -ex 'break main'
     #[arg(last = true)]
     arguments: Vec<OsString>,
-}
-
-/// `cargo xtask flash`.
-pub fn flash(workspace: &mut Workspace, options: &Options) -> Result<()> {
-    // Check before the build, which is useless without a probe.
-    check()?;
-    let elf = options.given.elf(workspace)?;
-    options.write(&elf)?;
-    say!("written, verified and started: {}", elf.display());
-    Ok(())
 }
 
 /// `cargo xtask run`.
@@ -114,7 +104,7 @@ pub fn free_port() -> Result<u16> {
 }
 
 /// Fails when probe-rs is not installed or sees no probe.
-fn check() -> Result<()> {
+pub fn check() -> Result<()> {
     check_list(Command::new("probe-rs").arg("list").output())
 }
 
@@ -137,7 +127,8 @@ fn check_list(list: io::Result<Output>) -> Result<()> {
 }
 
 impl Options {
-    fn probe_rs(&self, subcommand: &str) -> Command {
+    /// Returns probe-rs with the part and the probe.
+    pub fn probe_rs(&self, subcommand: &str) -> Command {
         let part = self.given.board().memory().part.name;
         let mut command = Command::new("probe-rs");
         command.args([subcommand, "--chip", self.chip.as_deref().unwrap_or(part)]);

@@ -6,18 +6,20 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context as _, Result};
+use ed25519_dalek::{SigningKey, VerifyingKey};
 use fs_err as fs;
 use object::{Object as _, ObjectSection as _};
-use register_map::Board;
+use register_map::part::FLASH_BASE;
+use register_map::{Board, update::Slot};
 use sha2::{Digest as _, Sha256};
 
+use crate::build::Program;
 use crate::error::usage;
 use crate::image::Elf;
 use crate::toolchain::TARGET;
 use crate::workspace::Workspace;
-use crate::{build, command, image};
+use crate::{build, command, flash, hex, image, keys, signed};
 
-mod hex;
 mod notices;
 mod paths;
 mod programs;
@@ -38,9 +40,28 @@ pub struct Options {
     #[arg(long, value_name = "TAG")]
     tag: Option<String>,
 
-    /// Build only the programs, with the images BOARD.elf of this directory in the simulator
+    /// Build only the programs, with loader and images of this directory in the simulator; this needs no key
     #[arg(long, value_name = "DIR")]
     images: Option<PathBuf>,
+
+    #[command(flatten)]
+    keys: keys::Release,
+
+    /// Security epoch of the images
+    #[arg(long, value_name = "NUMBER", default_value_t = 0)]
+    epoch: u16,
+
+    /// Take the signatures from the files BOARD.modio of this directory, those of a release, instead of signing: to
+    /// build the same bytes without the key
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["images", "key", "epoch"])]
+    signed: Option<PathBuf>,
+}
+
+/// What signs the images.
+enum Signer {
+    Key(SigningKey, u16),
+    /// A directory with the signed images of the same sources, and the public keys.
+    Signed(PathBuf, [VerifyingKey; 2]),
 }
 
 /// The tag of this version. All packages have the workspace's version.
@@ -51,6 +72,18 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<()> {
     if let Some(tag) = &options.tag {
         check_tag(tag, register_map::commit!())?;
     }
+    // Before the builds, which take long.
+    let signer = match options.images {
+        None => {
+            let (public, file) = options.keys.public(workspace)?;
+            let signer = match &options.signed {
+                Some(directory) => Signer::Signed(directory.clone(), public),
+                None => Signer::Key(options.keys.private(workspace, &public)?, options.epoch),
+            };
+            Some((signer, file))
+        }
+        Some(_) => None,
+    };
     let standard = workspace.target.join("dist");
     if options.out.is_none() {
         let _ = fs::remove_dir_all(&standard);
@@ -64,9 +97,17 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<()> {
     let target = programs::target(&rustc(&["--print", "host-tuple"])?);
     let workspace = &mut paths.reproducible(workspace, &target);
     let mut notices = Notices::default();
-    if options.images.is_none() {
+    if let Some((signer, public)) = signer {
+        workspace.keys = Some(public);
         for board in Board::ALL {
-            files(workspace, board, &out, &paths, &mut notices)?;
+            let mut release = Release {
+                workspace: &mut *workspace,
+                board,
+                out: &out,
+                paths: &paths,
+                notices: &mut notices,
+            };
+            release.files(&signer)?;
         }
         let root = &workspace.root;
         for name in ["LICENSE-APACHE", "LICENSE-MIT"] {
@@ -103,40 +144,93 @@ fn check_tag(tag: &str, commit: &str) -> Result<()> {
     Ok(())
 }
 
-/// Makes the files of a board.
-fn files(
-    workspace: &mut Workspace,
-    board: &Board,
-    out: &Path,
-    paths: &Paths,
-    notices: &mut Notices,
-) -> Result<()> {
-    let map = workspace.target.join(format!("{board}.map"));
-    let (built, packages) = build::linked(workspace, board, Some(&map))?;
-    let (elf, flash) = (fs::read(&built)?, fs::read(built.with_extension("bin"))?);
-    let parsed = image::parse(&elf)?;
-    let entry = parsed.entry() as u32;
-    let bill = sbom::Subject {
-        name: board.name,
-        kind: "firmware",
-        package: "firmware",
-        target: TARGET,
-        features: format!("firmware/{board}"),
-        compiled: &packages,
-        compiler: &compiler(&parsed)?,
-        sha256: sha256(&flash),
-    };
-    let bill = bill.bill(workspace, notices)?;
-    for (extension, content) in [
-        ("map", paths.replaced(&fs::read_to_string(map)?).into()),
-        ("elf", elf),
-        ("hex", hex::file(&flash, entry)?.into_bytes()),
-        ("bin", flash),
-        ("cdx.json", bill.into_bytes()),
-    ] {
-        fs::write(out.join(format!("{board}.{extension}")), content)?;
+/// The files of a board.
+struct Release<'a> {
+    workspace: &'a mut Workspace,
+    board: &'static Board,
+    out: &'a Path,
+    paths: &'a Paths,
+    notices: &'a mut Notices,
+}
+
+impl Release<'_> {
+    /// Makes the files: the image that runs alone, the loader, the application for both slots, the file of an update,
+    /// and loader and slot A for a programmer.
+    fn files(&mut self, signer: &Signer) -> Result<()> {
+        let board = self.board;
+        let (alone, entry) = self.program(Program::Alone, board.name)?;
+        self.write(
+            &format!("{board}.hex"),
+            hex::file(&[(FLASH_BASE, alone.clone())], entry)?,
+        )?;
+        self.write(&format!("{board}.bin"), alone)?;
+        let (loader, entry) = self.program(Program::Loader, &format!("{board}-loader"))?;
+        let mut images = Vec::new();
+        for (slot, letter) in Slot::ALL.into_iter().zip(["a", "b"]) {
+            let name = format!("{board}-{letter}");
+            self.program(Program::Slot(slot), &name)?;
+            let elf = fs::read(self.out.join(format!("{name}.elf")))?;
+            let mut image = signed::unsigned(board, slot, &elf)?;
+            match signer {
+                Signer::Key(key, epoch) => signed::sign(&mut image, key, *epoch),
+                Signer::Signed(directory, public) => {
+                    let file = directory.join(format!("{board}.modio"));
+                    let images = signed::images(&fs::read(&file)?);
+                    let signed = images.and_then(|images| {
+                        signed::sign_as(&mut image, &images[slot as usize], public)
+                    });
+                    signed.with_context(|| file.display().to_string())?;
+                }
+            }
+            images.push(image);
+        }
+        let [a, b]: [Vec<u8>; 2] = images.try_into().ok().context("two slots")?;
+        let complete = flash::loaded(board, Slot::A, loader, a.clone());
+        self.write(
+            &format!("{board}-complete.hex"),
+            hex::file(&complete, entry)?,
+        )?;
+        self.write(&format!("{board}.modio"), signed::file(&[a, b]))
     }
-    Ok(())
+
+    /// Builds a program, and writes its ELF file, its bill of materials and for the application its map. Returns its
+    /// flash, and its start address.
+    fn program(&mut self, program: Program, name: &str) -> Result<(Vec<u8>, u32)> {
+        let (package, map) = match program {
+            Program::Loader => ("loader", None),
+            Program::Slot(_) | Program::Alone => {
+                let map = self.workspace.target.join(format!("{name}.map"));
+                ("firmware", Some(map))
+            }
+        };
+        let built = build::program(self.workspace, self.board, program, map.as_deref())?;
+        let elf = fs::read(&built.elf)?;
+        let flash = fs::read(built.elf.with_extension("bin"))?;
+        let parsed = image::parse(&elf)?;
+        let entry = parsed.entry() as u32;
+        let bill = sbom::Subject {
+            name,
+            kind: "firmware",
+            package,
+            target: TARGET,
+            features: format!("{package}/{}", self.board),
+            compiled: &built.packages,
+            compiler: &compiler(&parsed)?,
+            sha256: sha256(&flash),
+        };
+        let bill = bill.bill(self.workspace, self.notices)?;
+        self.write(&format!("{name}.cdx.json"), bill)?;
+        if let Some(map) = map {
+            let map = self.paths.replaced(&fs::read_to_string(map)?);
+            self.write(&format!("{name}.map"), map)?;
+        }
+        self.write(&format!("{name}.elf"), elf)?;
+        Ok((flash, entry))
+    }
+
+    fn write(&self, name: &str, content: impl AsRef<[u8]>) -> Result<()> {
+        Ok(fs::write(self.out.join(name), content)?)
+    }
 }
 
 /// Returns the version of the rustc that has compiled an image, from a comment in the image.

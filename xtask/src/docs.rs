@@ -316,12 +316,17 @@ fn write_readings(out: &mut impl Write) -> Result {
 fn write_store(out: &mut impl Write) -> Result {
     out.write_str("\nA save goes to two flash pages: ")?;
     for (i, board) in Board::ALL.iter().enumerate() {
-        let [first, second] = board.store.addresses();
+        let loaded = board.layout().store;
+        let [first, second] = loaded.addresses();
         let separator = if i == 0 { "" } else { "; " };
         write!(
             out,
             "{separator}on the {board} those at {first:#010X} and {second:#010X}"
         )?;
+        if board.store != loaded {
+            let [first, second] = board.store.addresses();
+            write!(out, " (without a loader {first:#010X} and {second:#010X})")?;
+        }
     }
     writeln!(
         out,

@@ -30,9 +30,12 @@ mod debug;
 mod dist;
 mod docs;
 mod error;
+mod flash;
 mod fuzz;
 mod group;
+mod hex;
 mod image;
+mod keys;
 mod ordinary;
 mod peers;
 mod python;
@@ -57,14 +60,16 @@ struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Command {
-    /// Build the release image: ELF and .bin
+    /// Build the loader, the images for both slots, the file of an update, and the image that runs without a loader
     Build(build::Options),
-    /// Build the images for both slots behind the loader, sign them, and write the file of an update
-    // Hidden until the application takes an update.
-    #[command(hide = true)]
+    /// Build the images for both slots, sign them, and write the file of an update, BOARD.modio
     Image(signed::Options),
-    /// Write the image into a board with probe-rs, verify and start it
-    Flash(debug::Options),
+    /// Sign the file of an update again, with another key or epoch; this builds nothing
+    Sign(signed::Again),
+    /// Make a private key that signs updates, and show its public half, which the loader needs
+    Keygen(keys::New),
+    /// Write the loader and the image into a board with probe-rs or through a serial port, verify and start it
+    Flash(flash::Options),
     /// Build the image, run it on the board at the debug probe, or without one in the simulator, and show its log
     Run(debug::Options),
     /// Show the log of the image that runs on the board at the debug probe
@@ -79,10 +84,10 @@ enum Command {
     /// Run the steps of CI: formatting, lints, documentation, those of `test` and longer ones
     Ci(test::Chosen),
     /// Show flash and RAM by crate and section, and what is left of the parts and the budget
-    Size(build::Given),
+    Size(size::Options),
     /// Count the instructions of every request, the processor's load, flash and RAM
     Bench(bench::Options),
-    /// Build all files of a release: ELF, .bin, .hex, map, bill of materials, check sums
+    /// Build all files of a release: loader, signed images, programs, bills of materials, check sums
     Dist(dist::Options),
     /// Test the image on Renode: its suites and the conformance suite
     Renode(renode::Options),
@@ -140,7 +145,9 @@ fn run(cli: Cli) -> Result<()> {
     match cli.command {
         Command::Build(options) => build::run(workspace, &options),
         Command::Image(options) => signed::run(workspace, &options),
-        Command::Flash(options) => debug::flash(workspace, &options),
+        Command::Sign(options) => signed::again(workspace, &options),
+        Command::Keygen(new) => keys::generate(&new),
+        Command::Flash(options) => flash::run(workspace, &options),
         Command::Run(options) => debug::run(workspace, &options),
         Command::Attach(options) => debug::attach(workspace, &options),
         Command::Gdb(options) => debug::gdb(workspace, &options),

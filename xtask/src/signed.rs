@@ -1,23 +1,24 @@
-//! `cargo xtask image`: the file of an update, with the signed images for both slots.
+//! `cargo xtask image` and `sign`: the file of an update, with the signed images for both slots.
 
 use std::path::PathBuf;
 
-use anyhow::{Context as _, Result, ensure};
-use ed25519_dalek::{Signer as _, SigningKey};
+use anyhow::{Context as _, Result, anyhow, ensure};
+use ed25519_dalek::{Signature, Signer as _, SigningKey, VerifyingKey};
 use fs_err as fs;
 use register_map::layout::HEADER;
 use register_map::part::FLASH_BASE;
-use register_map::update::{Slot, crc32};
+use register_map::update::{Slot, crc32, intact};
 use register_map::{Board, first_32_bits};
 use semver::Version;
 use sha2::{Digest as _, Sha512};
 
+use crate::build::Program;
 use crate::error::usage;
 use crate::workspace::Workspace;
-use crate::{build, image};
+use crate::{build, image, keys};
 
-/// The key that everybody has.
-const DEVELOPMENT: &str = "loader/keys/development.key";
+/// Bytes to which the images in the file are padded, and bytes of the manifest.
+const BLOCK: usize = 128;
 
 /// The options of `cargo xtask image`.
 #[derive(clap::Args, Debug)]
@@ -25,6 +26,18 @@ pub struct Options {
     #[command(flatten)]
     build: build::Options,
 
+    #[command(flatten)]
+    signature: How,
+
+    /// Where to write the file; without it BOARD.modio beside the images
+    #[arg(long, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+/// How an image is signed.
+#[derive(clap::Args, Clone, Debug, Default)]
+#[group(skip)]
+pub struct How {
     /// Private key, 64 hexadecimal digits; without it the development key, which everybody has
     #[arg(long, value_name = "FILE")]
     key: Option<PathBuf>,
@@ -32,8 +45,19 @@ pub struct Options {
     /// Security epoch: once an image is confirmed, no image with a lower one is accepted
     #[arg(long, value_name = "NUMBER", default_value_t = 0)]
     epoch: u16,
+}
 
-    /// Where to write the file; without it BOARD.modio beside the images
+/// The options of `cargo xtask sign`.
+#[derive(clap::Args, Debug)]
+pub struct Again {
+    /// The file of an update
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+
+    #[command(flatten)]
+    signature: How,
+
+    /// Where to write the signed file; without it the file is replaced
     #[arg(long, value_name = "FILE")]
     output: Option<PathBuf>,
 }
@@ -41,10 +65,14 @@ pub struct Options {
 impl Options {
     /// Returns the options for a board, with the development key.
     pub fn of(board: &'static Board) -> Self {
+        Self::signed(board, How::default())
+    }
+
+    /// Returns the options for a board, with this key and epoch.
+    pub fn signed(board: &'static Board, signature: How) -> Self {
         Self {
             build: build::Options { board },
-            key: None,
-            epoch: 0,
+            signature,
             output: None,
         }
     }
@@ -54,6 +82,22 @@ impl Options {
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     let (_, file) = update(workspace, options)?;
     say!("{}", file.display());
+    Ok(())
+}
+
+/// `cargo xtask sign`.
+pub fn again(workspace: &Workspace, options: &Again) -> Result<()> {
+    let How { key, epoch } = &options.signature;
+    let key = keys::read(workspace, key.as_deref())?;
+    let path = &options.file;
+    let bytes = fs::read(path).map_err(|error| usage(error.to_string()))?;
+    let mut images = images(&bytes).map_err(|why| usage(format!("{}: {why:#}", path.display())))?;
+    images
+        .iter_mut()
+        .for_each(|image| sign(image, &key, *epoch));
+    let output = options.output.as_ref().unwrap_or(path);
+    fs::write(output, file(&images))?;
+    say!("{}", output.display());
     Ok(())
 }
 
@@ -73,35 +117,18 @@ pub fn update(workspace: &mut Workspace, options: &Options) -> Result<([PathBuf;
 /// Builds the image for a slot, signs it, and returns its file.
 pub fn image(workspace: &mut Workspace, options: &Options, slot: Slot) -> Result<PathBuf> {
     let board = options.build.board;
-    let path = options.key.clone();
-    let path = path.unwrap_or_else(|| workspace.root.join(DEVELOPMENT));
-    let key = key(&fs::read_to_string(&path).map_err(|error| usage(error.to_string()))?)
-        .with_context(|| path.display().to_string())?;
-    let elf = build::slot(workspace, board, slot)?;
-    let image = of_slot(board, slot, &image::read(&elf)?, &key, options.epoch)?;
+    let How { key, epoch } = &options.signature;
+    let key = keys::read(workspace, key.as_deref())?;
+    let elf = build::program(workspace, board, Program::Slot(slot), None)?.elf;
+    let mut image = unsigned(board, slot, &image::read(&elf)?)?;
+    sign(&mut image, &key, *epoch);
     let file = elf.with_extension("image");
     fs::write(&file, image)?;
     Ok(file)
 }
 
-/// Returns the key of a file with 64 hexadecimal digits.
-fn key(text: &str) -> Result<SigningKey> {
-    let digits = text.trim();
-    let byte = |at| u8::from_str_radix(digits.get(at..at + 2)?, 16).ok();
-    let bytes: Option<Vec<u8>> = (0..digits.len()).step_by(2).map(byte).collect();
-    let bytes = bytes.and_then(|bytes| <[u8; 32]>::try_from(bytes).ok());
-    let bytes = bytes.context("not a private key: 64 hexadecimal digits are needed")?;
-    Ok(SigningKey::from_bytes(&bytes))
-}
-
-/// Returns the signed image for a slot: the header, and the application in an ELF file.
-pub fn of_slot(
-    board: &Board,
-    slot: Slot,
-    elf: &[u8],
-    key: &SigningKey,
-    epoch: u16,
-) -> Result<Vec<u8>> {
+/// Returns the image for a slot, not signed yet: the header, and the application in an ELF file.
+pub fn unsigned(board: &Board, slot: Slot, elf: &[u8]) -> Result<Vec<u8>> {
     let layout = board.layout();
     let address = layout.slots[slot as usize];
     let mut flash = image::flat(elf, board.memory().part.flash)?;
@@ -127,26 +154,48 @@ pub fn of_slot(
     let version: Version = env!("CARGO_PKG_VERSION").parse()?;
     put(0, b"MODI");
     put(4, &[2, board.code as u8]);
-    put(6, &epoch.to_le_bytes());
     put(8, &[version.major as u8, version.minor as u8]);
     put(10, &(version.patch as u16).to_le_bytes());
     put(12, &address.to_le_bytes());
     put(16, &(application.len() as u32).to_le_bytes());
     put(24, &first_32_bits(register_map::commit!()).to_le_bytes());
     put(28, &Sha512::digest(&application));
-    let crc = crc32([&header[..20], &application]);
-    header[20..24].copy_from_slice(&crc.to_le_bytes());
-    let signature = key.sign(&header[..92]).to_bytes();
-    header[92..156].copy_from_slice(&signature);
-    let fingerprint = Sha512::digest(key.verifying_key().as_bytes());
-    header[156..160].copy_from_slice(&fingerprint[..4]);
     header.extend(application);
     Ok(header)
 }
 
+/// Gives an image a security epoch, and the CRC-32 that belongs to it.
+fn put_epoch(image: &mut [u8], epoch: [u8; 2]) {
+    image[6..8].copy_from_slice(&epoch);
+    let crc = crc32([&image[..20], &image[HEADER as usize..]]);
+    image[20..24].copy_from_slice(&crc.to_le_bytes());
+}
+
+/// Gives an image the epoch and the signature of the same image in the file of an update.
+pub fn sign_as(image: &mut [u8], signed: &[u8], public: &[VerifyingKey]) -> Result<()> {
+    put_epoch(image, [signed[6], signed[7]]);
+    image[92..160].copy_from_slice(&signed[92..160]);
+    let signature = Signature::from_slice(&image[92..156]);
+    let signature = signature.map_err(|_| anyhow!("not a signature"))?;
+    let is_right = |key: &VerifyingKey| key.verify_strict(&image[..92], &signature).is_ok();
+    ensure!(
+        public.iter().any(is_right),
+        "the signed image is not the one that was built"
+    );
+    Ok(())
+}
+
+/// Gives an image its security epoch, its CRC-32 and its signature.
+pub fn sign(image: &mut [u8], key: &SigningKey, epoch: u16) {
+    put_epoch(image, epoch.to_le_bytes());
+    let signature = key.sign(&image[..92]).to_bytes();
+    image[92..156].copy_from_slice(&signature);
+    let name = keys::first_bytes(key.verifying_key().as_bytes());
+    image[156..160].copy_from_slice(&name);
+}
+
 /// Returns the file of an update: both images, each padded to 128 bytes, and the manifest.
-fn file(images: &[Vec<u8>]) -> Vec<u8> {
-    const BLOCK: usize = 128;
+pub fn file(images: &[Vec<u8>; 2]) -> Vec<u8> {
     let mut file = Vec::new();
     let mut manifest = b"MODM\x01\0\0\0".to_vec();
     for image in images {
@@ -164,13 +213,37 @@ fn file(images: &[Vec<u8>]) -> Vec<u8> {
     file
 }
 
+/// Returns the images in the file of an update. A damaged file is an error.
+pub fn images(file: &[u8]) -> Result<[Vec<u8>; 2]> {
+    let damaged = "not the file of an update, or damaged";
+    let (body, manifest) = file.split_last_chunk::<BLOCK>().context(damaged)?;
+    let number = |at: usize| -> Option<usize> {
+        let bytes = manifest.get(at..at + 4)?.try_into().ok()?;
+        usize::try_from(u32::from_le_bytes(bytes)).ok()
+    };
+    let image = |at| {
+        let image = body.get(number(at)?..)?.get(..number(at + 4)?)?;
+        intact(image, crc32).is_ok().then(|| image.to_vec())
+    };
+    let images = [image(8), image(16)].map(|image| image.context(damaged));
+    let [a, b] = images;
+    let images = [a?, b?];
+    // What follows from the images must be what is in the file.
+    ensure!(self::file(&images) == file, damaged);
+    Ok(images)
+}
+
 #[cfg(test)]
 mod tests {
-    use register_map::board::MODIO_02;
-    use register_map::update::intact;
-
     use super::*;
     use crate::image::sample::{code, elf};
+
+    fn of_slot(slot: Slot, elf: &[u8], key: &SigningKey, epoch: u16) -> Result<Vec<u8>> {
+        let mut image = unsigned(&MODIO_02, slot, elf)?;
+        sign(&mut image, key, epoch);
+        Ok(image)
+    }
+    use register_map::board::MODIO_02;
 
     #[test]
     fn image_of_a_slot_is_intact_and_signed_for_its_address() {
@@ -178,7 +251,7 @@ mod tests {
         let [a, b] = MODIO_02.layout().slots;
         let bytes: Vec<u8> = (1..1002_u32).map(|n| (n * n) as u8).collect();
         let built = elf(&[code(b + HEADER, &bytes)], &[]);
-        let image = of_slot(&MODIO_02, Slot::B, &built, &key, 3).unwrap();
+        let image = of_slot(Slot::B, &built, &key, 3).unwrap();
         assert_eq!(image.len(), 512 + 1004);
         let mut slot = image.clone();
         slot.resize(54 * 1024, 0xFF);
@@ -189,10 +262,10 @@ mod tests {
         let public = key.verifying_key();
         assert!(public.verify_strict(header.signed(), &signature).is_ok());
         assert_eq!(header.hash()[..], Sha512::digest(&image[512..])[..]);
-        let error = of_slot(&MODIO_02, Slot::A, &built, &key, 3).unwrap_err();
+        let error = of_slot(Slot::A, &built, &key, 3).unwrap_err();
         assert!(error.to_string().contains(&format!("{a:#010x}")), "{error}");
         let long = elf(&[code(b + HEADER, &vec![0; 54 * 1024 - 511])], &[]);
-        assert!(of_slot(&MODIO_02, Slot::B, &long, &key, 3).is_err());
+        assert!(of_slot(Slot::B, &long, &key, 3).is_err());
     }
 
     #[test]
@@ -210,19 +283,45 @@ mod tests {
     }
 
     #[test]
-    fn development_key_belongs_to_the_first_public_key_of_the_loader() {
-        let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../loader/keys/development");
-        let private = key(&fs::read_to_string(format!("{root}.key")).unwrap()).unwrap();
-        let public = fs::read_to_string(format!("{root}.pub")).unwrap();
-        let digits: String = private
-            .verifying_key()
-            .as_bytes()
-            .iter()
-            .map(|byte| format!("{byte:02x}"))
-            .collect();
-        assert_eq!(public.lines().next(), Some(&digits[..]));
-        for wrong in ["", "12", "zz", &"é".repeat(32), &"00".repeat(33)] {
-            assert!(key(wrong).is_err(), "{wrong}");
+    fn signing_again_changes_epoch_and_signature_and_is_the_same_each_time() {
+        let [first, second] = [7, 8].map(|byte| SigningKey::from_bytes(&[byte; 32]));
+        let of = |slot: Slot, key, epoch| {
+            let address = MODIO_02.layout().slots[slot as usize] + HEADER;
+            let built = elf(&[code(address, &[5; 1024])], &[]);
+            of_slot(slot, &built, key, epoch).unwrap()
+        };
+        let signed = |key, epoch| file(&Slot::ALL.map(|slot| of(slot, key, epoch)));
+        let [mut a, _] = images(&signed(&first, 0)).unwrap();
+        let signature = of(Slot::A, &second, 4);
+        sign_as(&mut a, &signature, &[second.verifying_key()]).unwrap();
+        assert_eq!(a, signature);
+        assert!(sign_as(&mut a, &signature, &[first.verifying_key()]).is_err());
+        assert!(sign_as(&mut a, &of(Slot::B, &first, 4), &[first.verifying_key()]).is_err());
+
+        let directory = tempfile::tempdir().unwrap();
+        let [path, key] = ["modio-02.modio", "key"].map(|name| directory.path().join(name));
+        fs::write(&path, signed(&first, 0)).unwrap();
+        fs::write(&key, "08".repeat(32)).unwrap();
+        let options = Again {
+            file: path.clone(),
+            signature: How {
+                key: Some(key),
+                epoch: 4,
+            },
+            output: None,
+        };
+        let workspace = Workspace::open().unwrap();
+        for _ in 0..2 {
+            again(&workspace, &options).unwrap();
+            assert_eq!(fs::read(&path).unwrap(), signed(&second, 4));
+        }
+        for (at, length) in [(700, 3200), (3190, 3200), (0, 127)] {
+            let mut damaged = signed(&first, 0);
+            damaged[at] ^= 1;
+            damaged.truncate(length);
+            fs::write(&path, damaged).unwrap();
+            let error = again(&workspace, &options).unwrap_err();
+            assert!(error.is::<crate::error::Usage>(), "{at}: {error}");
         }
     }
 }

@@ -5,9 +5,12 @@ use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
 use register_map::board::{Board, Memory};
+use register_map::layout::LOADER;
 use register_map::part::KIB;
+use register_map::update::Slot;
 use serde_json::{Value, json};
 
+use crate::build::Program;
 use crate::workspace::Workspace;
 use crate::{build, image, table};
 
@@ -17,18 +20,44 @@ mod source;
 use measure::{Bytes, Sizes, measure};
 pub use source::{Source, structures};
 
-/// `cargo xtask size`. An image that exceeds a limit is an error.
-pub fn run(workspace: &mut Workspace, given: &build::Given) -> Result<()> {
-    let sizes = of(&given.elf(workspace)?)?;
-    let memory = given.board().memory();
-    say!("{}", as_table(&sizes, memory));
-    within_limits(sizes.total(), memory)
+/// The board, and which image to measure.
+#[derive(clap::Args, Clone, Debug)]
+#[group(skip)]
+pub struct Options {
+    #[command(flatten)]
+    given: build::Given,
+
+    /// Measure the application for a slot behind the loader, a or b, instead of the image that runs without a loader
+    #[arg(long, value_name = "LETTER", value_parser = build::slot, conflicts_with = "elf")]
+    slot: Option<Slot>,
 }
 
-/// Fails when the image does not fit the parts and the budget of a board.
+/// `cargo xtask size`. An image that exceeds a limit is an error.
+pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
+    let board = options.given.board();
+    let elf = match options.slot {
+        Some(slot) => build::program(workspace, board, Program::Slot(slot), None)?.elf,
+        None => options.given.elf(workspace)?,
+    };
+    let sizes = of(&elf)?;
+    say!("{}", as_table(&sizes, board.memory()));
+    within_limits(sizes.total(), board.memory())
+}
+
+/// Fails when the loader or an image does not fit the parts and the budget of a board.
 pub fn check(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
-    let elf = build::image(workspace, board)?;
-    within_limits(of(&elf)?.total(), board.memory())
+    let loader = build::loader(workspace, board)?;
+    let [flash, _] = of(&loader)?.total();
+    ensure!(
+        flash <= LOADER,
+        "the loader takes {flash} bytes of flash, more than its {LOADER}"
+    );
+    let slots = Slot::ALL.map(Program::Slot);
+    for program in slots.into_iter().chain([Program::Alone]) {
+        let elf = build::program(workspace, board, program, None)?.elf;
+        within_limits(of(&elf)?.total(), board.memory())?;
+    }
+    Ok(())
 }
 
 /// Returns flash and RAM of an image, and of each crate.

@@ -352,7 +352,6 @@ pub fn simulated(
         ];
         files.extend(names.into_iter().zip(loaded(workspace, &MODIO_08)?));
     }
-    // Afterwards, because an application for a slot has the same name until it is renamed.
     files.push(("MODIO_ELF", build::image(workspace, &MODIO_02)?));
     files.push(("MODIO_ELF_08", build::image(workspace, &MODIO_08)?));
     let simulator = workspace.simulator()?;

@@ -1,7 +1,8 @@
 //! The project on this machine: its directories, and how cargo is called.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::env;
+use std::path::{self, Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context as _, Result};
@@ -24,6 +25,9 @@ pub struct Workspace {
     pub install: bool,
     /// Whether host tests leave out the simulator.
     pub host: bool,
+    /// The file with the public keys that the loader trusts: that of the variable `MODIO_KEYS`, or of a release. Without
+    /// it `loader/build.rs` takes the development keys.
+    pub keys: Option<PathBuf>,
 }
 
 impl Workspace {
@@ -37,6 +41,8 @@ impl Workspace {
         Ok(Self {
             target: metadata.exec()?.target_directory.into(),
             root,
+            // Of this directory. The build would look for it in the directory of the loader.
+            keys: env::var_os("MODIO_KEYS").map(path::absolute).transpose()?,
             ..Self::default()
         })
     }

@@ -1,5 +1,5 @@
-//! The programs of a release. They run without Rust and without this repository; the simulator contains the images of
-//! all boards.
+//! The programs of a release. They run without Rust and without this repository; the simulator contains the loaders and
+//! images of all boards.
 //!
 //! On Linux they are linked with musl, so that they need no library of the system and run on every distribution.
 
@@ -24,8 +24,8 @@ const PROGRAMS: [(&str, &str); 4] = [
     ("hil", "modio-hil"),
 ];
 
-/// Builds the programs for a target, the simulator with the images `BOARD.elf` of a directory in it, and writes them
-/// and their bills of materials.
+/// Builds the programs for a target, the simulator with the loaders and images of a directory in it, and writes them and
+/// their bills of materials.
 pub fn files(
     workspace: &Workspace,
     target: &str,
@@ -38,9 +38,12 @@ pub fn files(
     let _ = fs::remove_dir_all(&inside);
     fs::create_dir_all(&inside)?;
     for board in Board::ALL {
-        let name = format!("{board}.elf");
-        let elf = stripped(&image::read(&images.join(&name))?)?;
-        fs::write(inside.join(name), elf)?;
+        for name in [format!("{board}.elf"), format!("{board}-loader.elf")] {
+            let elf = stripped(&image::read(&images.join(&name))?)?;
+            fs::write(inside.join(name), elf)?;
+        }
+        let update = format!("{board}.modio");
+        fs::copy(images.join(&update), inside.join(update))?;
     }
     Machine::default().add(target)?;
     let mut cargo = workspace.cargo("build");
@@ -83,7 +86,7 @@ pub fn target(host: &str) -> String {
     }
 }
 
-/// Returns an image without debug information. Its symbols remain, because the simulator uses them to find the log.
+/// Returns an image without debug information.
 fn stripped(elf: &[u8]) -> Result<Vec<u8>> {
     let mut builder = Builder::<'_>::read32(elf).context("cannot strip the image")?;
     for section in &mut builder.sections {

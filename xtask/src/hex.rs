@@ -3,19 +3,22 @@
 use anyhow::{Context as _, Result};
 use ihex::Record;
 
-use crate::image::FLASH_BASE;
-
 /// Bytes in a data record: a length that every programmer accepts.
 const BYTES: usize = 16;
 
-/// Returns the HEX file for these bytes, from the first address of flash on, and for the start address of the program.
-pub fn file(flash: &[u8], entry: u32) -> Result<String> {
+/// Returns the HEX file for these bytes at their addresses, and for the start address of the program.
+pub fn file(regions: &[(u32, Vec<u8>)], entry: u32) -> Result<String> {
     let mut records = Vec::new();
-    // A data record has the lower half of its address only.
-    for (upper, block) in (FLASH_BASE >> 16..).zip(flash.chunks(0x1_0000)) {
-        records.push(Record::ExtendedLinearAddress(upper as u16));
-        for (n, data) in block.chunks(BYTES).enumerate() {
-            let (offset, value) = ((n * BYTES) as u16, data.to_vec());
+    let mut upper = None;
+    for (address, bytes) in regions {
+        for (at, data) in (*address..).step_by(BYTES).zip(bytes.chunks(BYTES)) {
+            // A data record has the lower half of its address only. Regions begin at a page, so no record crosses the
+            // border of such a half.
+            let half = (at >> 16) as u16;
+            if upper.replace(half) != Some(half) {
+                records.push(Record::ExtendedLinearAddress(half));
+            }
+            let (offset, value) = (at as u16, data.to_vec());
             records.push(Record::Data { offset, value });
         }
     }
@@ -31,7 +34,8 @@ mod tests {
     fn file_has_every_byte_at_its_address_and_the_entry() {
         let mut flash = vec![0xFF; 0x1_0011];
         (flash[0x0012], flash[0x1_0010]) = (0xAB, 0xCD);
-        let text = file(&flash, 0x0800_0131).unwrap();
+        let regions = [(0x0800_0000, flash), (0x0803_F800, vec![0xEF])];
+        let text = file(&regions, 0x0800_0131).unwrap();
         let lines: Vec<_> = text.lines().collect();
         let blank = format!(":10000000{}00", "FF".repeat(16));
         assert_eq!(lines[..2], [":020000040800F2", &blank]);
@@ -40,9 +44,11 @@ mod tests {
             ":020000040801F1",
             &blank,
             ":01001000CD22",
+            ":020000040803EF",
+            ":01F80000EF18",
             ":0400000508000131BD",
             ":00000001FF",
         ];
-        assert_eq!(lines[lines.len() - 5..], rest);
+        assert_eq!(lines[lines.len() - rest.len()..], rest);
     }
 }
