@@ -70,7 +70,7 @@ const ROWS: [Row; 2] = [
         memory: Memory {
             part: STM32F103CB,
             smaller: Some(STM32F103C8),
-            stack: 8 * KIB,
+            stack: 9 * KIB,
             budget: [52 * KIB, 9 * KIB + 512],
         },
     },
@@ -84,7 +84,7 @@ const ROWS: [Row; 2] = [
         memory: Memory {
             part: STM32F103RC,
             smaller: None,
-            stack: 10 * KIB,
+            stack: 11 * KIB,
             budget: [53 * KIB, 12 * KIB],
         },
     },

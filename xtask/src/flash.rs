@@ -73,7 +73,12 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     let (mut regions, entry) = options.regions(workspace)?;
     let read = |address, length| options.read(workspace, address, length);
     let is_alone = options.plain || options.board.given.is_given();
-    match settings(board, is_alone, read) {
+    let held = holds_loader(board, read);
+    if is_alone && matches!(held, Ok(true)) {
+        // Otherwise a later call would find the loader's images again, and take the settings from their store.
+        regions.extend(forgotten(board, Slot::B));
+    }
+    match held.and_then(|held| settings(board, is_alone, held, read)) {
         Ok(Some(settings)) => {
             eprintln!("xtask: the settings move to {:#010x}", settings.0);
             regions.push(settings);
@@ -87,11 +92,22 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     options.write(workspace, &regions, entry)
 }
 
+/// Returns whether a board has a loader: a slot begins with the header of an image.
+fn holds_loader(board: &Board, read: impl Fn(u32, u32) -> Result<Vec<u8>>) -> Result<bool> {
+    let [a, b] = board.layout().slots.map(|slot| {
+        let header = read(slot, HEADER)?;
+        Ok::<_, anyhow::Error>(Header::of(&header).is_ok())
+    });
+    // A part without a loader may be smaller, so that there is nothing to read at slot B.
+    Ok(a? || b.unwrap_or(false))
+}
+
 /// Returns where the settings on a board have to go, and their pages, if they are in the pages of an image of the other
-/// kind. `is_alone` says that an image that runs without a loader will be written.
+/// kind. `is_alone` says that an image that runs without a loader will be written, `holds_loader` that there is one.
 fn settings(
     board: &Board,
     is_alone: bool,
+    holds_loader: bool,
     read: impl Fn(u32, u32) -> Result<Vec<u8>>,
 ) -> Result<Option<(u32, Vec<u8>)>> {
     let layout = board.layout();
@@ -102,12 +118,6 @@ fn settings(
     if from == to {
         return Ok(None);
     }
-    let [a, b] = layout.slots.map(|slot| {
-        let header = read(slot, HEADER)?;
-        Ok::<_, anyhow::Error>(Header::of(&header).is_ok())
-    });
-    // A part without a loader may be smaller, so that there is nothing to read at slot B.
-    let holds_loader = a? || b.unwrap_or(false);
     let TwoPages { first, bytes } = from;
     if holds_loader != is_alone {
         return Ok(None);
@@ -121,17 +131,21 @@ fn settings(
 /// Returns what is written for a slot: the loader, the image, and erased pages: the boot state, and the first page of
 /// the other slot.
 pub fn loaded(board: &Board, slot: Slot, loader: Vec<u8>, image: Vec<u8>) -> Regions {
-    let layout = board.layout();
-    let [own, other] = [slot, slot.other()].map(|slot| layout.slots[slot as usize]);
-    let erased = |pages: u32| vec![0xFF; (pages * layout.boot.bytes) as usize];
-    let mut regions = vec![
-        (FLASH_BASE, loader),
-        (own, image),
-        (other, erased(1)),
-        (layout.boot.first, erased(2)),
-    ];
+    let own = board.layout().slots[slot as usize];
+    let mut regions = vec![(FLASH_BASE, loader), (own, image)];
+    regions.extend(forgotten(board, slot.other()));
     regions.sort_unstable_by_key(|(address, _)| *address);
     regions
+}
+
+/// Returns erased pages: the first one of a slot, and the boot state.
+fn forgotten(board: &Board, slot: Slot) -> [(u32, Vec<u8>); 2] {
+    let layout = board.layout();
+    let erased = |pages: u32| vec![0xFF; (pages * layout.boot.bytes) as usize];
+    [
+        (layout.slots[slot as usize], erased(1)),
+        (layout.boot.first, erased(2)),
+    ]
 }
 
 impl Options {
@@ -231,7 +245,8 @@ mod tests {
     fn settings_move_only_to_an_image_of_the_other_kind() {
         let mut flash = vec![0xFF; 0x2_0000];
         let moved = |flash: &[u8], is_alone| {
-            let moved = settings(&MODIO_02, is_alone, reader(flash)).unwrap();
+            let held = holds_loader(&MODIO_02, reader(flash)).unwrap();
+            let moved = settings(&MODIO_02, is_alone, held, reader(flash)).unwrap();
             moved.map(|(to, pages)| (to, pages.len()))
         };
         assert_eq!(moved(&flash, false), None, "a new part");
@@ -245,13 +260,17 @@ mod tests {
         flash[0x1_1800..][..5].copy_from_slice(b"MODI\x02");
         assert_eq!(moved(&flash, false), None);
         assert_eq!(moved(&flash, true), Some((0x0800_F800, 2048)));
+        // An image that runs alone replaces the loader for good.
+        for (address, bytes) in forgotten(&MODIO_02, Slot::B) {
+            let at = (address - FLASH_BASE) as usize;
+            flash[at..at + bytes.len()].copy_from_slice(&bytes);
+        }
+        assert_eq!(moved(&flash, true), None);
 
         let unread = |_, _| Err(anyhow!("not read"));
-        assert!(settings(&MODIO_02, false, unread).is_err());
-        assert!(
-            settings(&MODIO_08, false, unread).unwrap().is_none(),
-            "the same pages"
-        );
+        assert!(holds_loader(&MODIO_02, unread).is_err());
+        let same = settings(&MODIO_08, false, false, unread).unwrap();
+        assert_eq!(same, None, "the same pages");
     }
 
     #[test]

@@ -45,18 +45,21 @@ impl Persistence {
     /// Begins a save that was ordered, or continues one, until its end or until the supply is too low, one flash
     /// operation at a time with interrupts in between. Then restarts the device if that was ordered.
     pub fn work(&mut self, device: &mut impl Mutex<T = &'static mut Device>) -> Option<Event> {
-        let (save, restart) = device.lock(|device| (device.config.is_saving(), device.restart));
+        let save = device.lock(|device| device.config.is_saving());
         let event = if save { self.save(device) } else { None };
-        if let Some(restart) = restart
-            && self.saving.is_none()
-        {
-            match restart {
-                Restart::Asked => kept::keep_asked(),
-                Restart::As255 => kept::keep_as_255(),
-                Restart::Update => kept::end_choice(),
+        // Under the lock, so that no save is ordered in between.
+        device.lock(|device| match device.restart {
+            Some(restart) if !device.config.has_save() => {
+                kept::keep_saves(device.config.saves_left());
+                match restart {
+                    Restart::Asked => kept::keep_asked(),
+                    Restart::As255 => kept::keep_as_255(),
+                    Restart::Update => {}
+                }
+                board_support::restart()
             }
-            board_support::restart();
-        }
+            _ => {}
+        });
         event
     }
 

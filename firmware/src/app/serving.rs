@@ -85,7 +85,7 @@ impl Serving {
         if let Some(order) = self.radio.order
             && radio.lock(|line| {
                 line.as_ref().is_some_and(|line| {
-                    !line.is_replying() && (order != Command::Restart || !line.is_on_air())
+                    !(line.is_replying() || restarts(order) && line.is_on_air())
                 })
             })
         {
@@ -173,6 +173,14 @@ impl Served {
         let counters = self.server.counters_at(line);
         device.lock(|device| *device.state.counters_of(self.line) = counters);
     }
+}
+
+/// Returns whether a command restarts the device.
+const fn restarts(order: Command) -> bool {
+    matches!(
+        order,
+        Command::Restart | Command::RestartAs255 | Command::Finish | Command::GoBack
+    )
 }
 
 /// Executes the command of a request whose reply has been sent, or passes it on to the background task.

@@ -19,15 +19,19 @@ use crate::{
     clock,
 };
 
-/// Time between two erases, in which everything that waited runs, in milliseconds.
-const PAUSE_MS: u32 = 10;
+/// Time between two erases, in milliseconds: the watchdog needs a sign of life of every task, and each is asked in turn.
+const ERASES_APART_MS: u32 = 25;
+/// Time in which the watchdog can be refreshed, in milliseconds.
+const STEPS_APART_MS: u32 = 1;
+/// Steps without such a pause: as many as blocks are staged.
+const STEPS: usize = 2;
 
 /// The boot state, and the steps under way.
 pub struct Updating {
     journal: Journal,
     crc: CrcUnit,
-    /// Time of the last erase.
-    erased: u32,
+    /// End of the last step.
+    ended: u32,
 }
 
 impl Updating {
@@ -35,7 +39,7 @@ impl Updating {
         Self {
             journal: Journal::open(&BootPages(flash)),
             crc,
-            erased: 0,
+            ended: 0,
         }
     }
 
@@ -54,13 +58,19 @@ impl Updating {
         ))
     }
 
-    /// Performs the steps that are due: at most one erase, or all blocks that are staged.
+    /// Performs the steps that are due: one erase, or two others. Blocks may arrive faster than they are programmed.
+    // Not inlined, so that blocks are on the stack during this work only.
+    #[inline(never)]
     pub fn work(&mut self, flash: &mut Flash, device: &mut impl Mutex<T = &'static mut Device>) {
-        loop {
+        let passed = clock::millis().wrapping_sub(self.ended);
+        if passed < STEPS_APART_MS {
+            return;
+        }
+        for _ in 0..STEPS {
             let next = device.lock(|device| device.update.as_ref()?.next());
             let Some(job) = next else { return };
             let erases = matches!(job, Job::InSlot(InSlot::Erase(_)));
-            if erases && clock::millis().wrapping_sub(self.erased) < PAUSE_MS {
+            if erases && clock::millis().wrapping_sub(self.ended) < ERASES_APART_MS {
                 return;
             }
             let Some(done) = self.perform(&job, flash) else {
@@ -70,16 +80,23 @@ impl Updating {
             let after = device.lock(|device| {
                 let update = device.update.as_mut();
                 let after = update.map_or(After::Nothing, |update| update.end(&job, done, image));
-                if after == After::Restart {
-                    device.restart = Some(Restart::Update);
+                match after {
+                    After::Nothing => {}
+                    After::Restart => device.restart = Some(Restart::Update),
+                    // The 15 minutes may have just ended.
+                    After::Confirmed => {
+                        device
+                            .restart
+                            .take_if(|restart| *restart == Restart::Update);
+                    }
                 }
                 after
             });
-            if after == After::Confirmed {
+            if after != After::Nothing {
                 kept::end_choice();
             }
+            self.ended = clock::millis();
             if erases {
-                self.erased = clock::millis();
                 return;
             }
         }

@@ -400,6 +400,12 @@ impl<const SLOTS: usize> Config<SLOTS> {
         matches!(self.save, Save::Begun)
     }
 
+    /// Returns whether a save is ordered or has begun.
+    #[must_use]
+    pub const fn has_save(&self) -> bool {
+        !matches!(self.save, Save::None)
+    }
+
     /// Advances the time by `ms` milliseconds. The lock closes 60 s after the last write, and the budget gets one
     /// save a minute.
     pub fn tick(&mut self, ms: u32) {
@@ -414,7 +420,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
         const fn bit(mask: u16, set: bool) -> u16 {
             if set { mask } else { 0 }
         }
-        let unsaved = self.differences > 0 || !matches!(self.save, Save::None);
+        let unsaved = self.differences > 0 || self.has_save();
         bit(status::STORED_INVALID, self.invalid)
             | bit(status::UNSAVED, unsaved)
             | bit(status::RESTART_NEEDED, self.waiting)

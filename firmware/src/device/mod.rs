@@ -163,9 +163,10 @@ impl<const SLOTS: usize> Device<SLOTS> {
         self.config.tick(ms);
         let timeout_ms = self.config.comm_timeout_ms();
         let tripped = self.comm_watchdog.check(self.state.millis(), timeout_ms);
-        if self.state.uptime_s() >= TRIAL_S && self.update.as_ref().is_some_and(Update::is_on_trial)
+        if self.state.uptime_s() >= TRIAL_S
+            && self.update.as_ref().is_some_and(Update::is_unconfirmed)
         {
-            self.restart = Some(Restart::Update);
+            self.restart.get_or_insert(Restart::Update);
         }
         if tripped {
             self.points.ports_mut().iter_mut().for_each(IoPort::go_safe);
@@ -209,8 +210,12 @@ impl<const SLOTS: usize> Device<SLOTS> {
     pub fn carry_out(&mut self, order: Command, line: LineName) {
         match order {
             Command::Save => self.config.begin_save(),
-            Command::Restart => self.restart = Some(Restart::Asked),
-            Command::RestartAs255 => self.restart = Some(Restart::As255),
+            Command::Restart => {
+                self.restart.get_or_insert(Restart::Asked);
+            }
+            Command::RestartAs255 => {
+                self.restart.get_or_insert(Restart::As255);
+            }
             Command::LoadDefaults => self.config.load_defaults(),
             Command::DropChanges => self.config.drop_changes(),
             Command::ClearWatchdogFlag => self.comm_watchdog.clear(),
@@ -226,6 +231,8 @@ impl<const SLOTS: usize> Device<SLOTS> {
     fn order_update(&mut self, order: Command, line: LineName) {
         if let Some(update) = &mut self.update
             && let Some(order) = Order::of(order)
+            // The other line may have given an order since this one was checked.
+            && update.check(order).is_ok()
             && (order != Order::Prepare || self.config.take_save().is_some())
         {
             update.take(order, line);

@@ -98,6 +98,8 @@ pub struct Update {
     bad: Option<u16>,
     /// Number of times that a bad page may still be erased.
     repairs: u8,
+    /// The first block that came last was refused, so those behind it are of an image for another board or slot.
+    refused: Cell<bool>,
     /// Why the first block was refused, or the image is not intact.
     reason: Cell<Option<Reason>>,
     order: Option<Order>,
@@ -140,6 +142,7 @@ impl Update {
             pages: 0,
             bad: None,
             repairs: 0,
+            refused: Cell::new(false),
             reason: Cell::new(None),
             order: None,
             intact: false,
@@ -150,6 +153,12 @@ impl Update {
     #[must_use]
     pub fn is_on_trial(&self) -> bool {
         !self.running.is_confirmed()
+    }
+
+    /// Returns whether the running image is on trial, and no order to confirm it is being carried out.
+    #[must_use]
+    pub fn is_unconfirmed(&self) -> bool {
+        self.is_on_trial() && self.order.is_none()
     }
 
     /// Returns register 0x022A.
@@ -229,10 +238,11 @@ impl Update {
         {
             if self.is_open(line) {
                 self.reason.set(Some(reason));
+                self.refused.set(true);
             }
             return Err(Exception::IllegalDataValue);
         }
-        let known = block == 0 || self.header.is_some();
+        let known = block == 0 || self.header.is_some() && !self.refused.get();
         let [_, second] = &self.staged;
         let takes = self.is_open(line) && self.pages == 0 && !self.is_worn();
         if takes && known && second.is_none() {
@@ -282,6 +292,7 @@ impl Update {
             && let Ok((crc, blocks)) = self.first_of(&bytes)
         {
             self.reason.set(None);
+            self.refused.set(false);
             if self.header != Some(crc) || self.missing.blocks() != blocks {
                 self.header = Some(crc);
                 self.missing = Missing::all(blocks);
@@ -426,6 +437,7 @@ impl Update {
             Some(Order::Prepare) => {
                 self.running.prepared = true;
                 self.header = None;
+                self.refused.set(false);
                 self.missing = Missing::all(0);
                 self.staged = [const { None }; 2];
                 self.pages = self.all_pages();

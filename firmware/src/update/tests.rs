@@ -281,6 +281,14 @@ fn blocks_of_another_line_slot_board_or_place_are_refused() {
     }
     assert_eq!(unit.send(0, &good[..128]), Ok(()));
     assert_eq!(unit.state(), [1, 0, 20, 20]);
+    assert_eq!(unit.send(1, &good[128..256]), Ok(()));
+    unit.work();
+    // Blocks behind the header of another image are not this unit's.
+    let other = image_for(Slot::B, 2, 20, 9);
+    assert!(unit.send(0, &other[..128]).is_err());
+    assert_eq!(unit.send(2, &other[256..384]), BUSY);
+    assert_eq!(unit.send(0, &good[..128]), Ok(()));
+    assert_eq!(unit.state(), [1, 0, 20, 18]);
     assert_eq!(
         unit.send(20, &good[..128]),
         Err(Exception::IllegalDataAddress)

@@ -86,6 +86,24 @@ fn preparation_costs_a_save_of_the_budget() {
     assert_eq!(bench.write(at::COMMAND, &[PREPARE]), Ok(()));
 }
 
+/// Each line's order waits for its own reply, so both may have been checked before one is carried out.
+#[test]
+fn order_that_was_checked_before_an_order_of_the_other_line_is_not_taken() {
+    let mut bench = bench(OfSlot::Confirmed, 1);
+    let before = bench.device.config.saves_left();
+    for line in [LineName::Rs485, LineName::Radio] {
+        bench.device.carry_out(Command::Prepare, line);
+        assert_eq!(bench.device.config.saves_left(), before - 1);
+    }
+    write_state(&mut bench);
+    assert_eq!(bench.device.update.as_ref().unwrap().record(6), 54);
+    bench.unlock();
+    // A restart does not replace the one that the boot state needs.
+    bench.device.restart = Some(Restart::Update);
+    assert_eq!(bench.write(at::COMMAND, &[2]), Ok(()));
+    assert_eq!(bench.device.restart, Some(Restart::Update));
+}
+
 #[test]
 fn preparation_over_the_air_needs_a_radio_with_settings() {
     for (lora, answer) in [(1, Ok(())), (2, Err(6))] {

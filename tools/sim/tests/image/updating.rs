@@ -10,11 +10,12 @@ use sim::line::{Format, Settings};
 use sim::{Module, Time};
 
 use crate::LAYOUT;
-use crate::bench::{Bench, PAGE_SIZE, SLOT};
+use crate::bench::{Bench, PAGE_SIZE, SLOT, adu};
 use crate::in_slots::{
     APPLICATION, CHECK, HASH, LENGTH, SIGNATURE, START, answers, answers_as, fitted, flash,
     holding, image, runs_from, sign, signed, unit, with_crc,
 };
+use crate::saving::SLOWEST;
 
 /// The state of an update, from file 2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -462,6 +463,45 @@ fn absurd_bounds_in_a_new_header_are_refused() {
         let refused = (slot, status.state, status.reason);
         assert_eq!(refused, (0, REJECTED, reason), "{number:#x} at {at}");
     }
+}
+
+/// The slowest flash, writes of outputs all the time, and blocks faster than they are programmed.
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn the_watchdog_is_refreshed_whatever_a_master_sends_during_an_update() {
+    let stored = [(BAUD, Baud::B921600.code())];
+    let module = Module::Do4;
+    let mut bench = fitted(flash([&image(0), &[]], module, &stored), module, 1);
+    bench.settings(FAST);
+    answers(&mut bench, CHECK + START).expect("it starts");
+    bench.patience = ERASE;
+    bench.board.set_flash_durations(SLOWEST);
+    assert_eq!(bench.order(Command::Prepare), Ok(()));
+    let mut on = false;
+    while bench.update_status().pages > 0 {
+        for _ in 0..20 {
+            on = !on;
+            bench.write_bit(SLOT, on).unwrap();
+        }
+    }
+    let silence = bench.t35() + bench.characters(1);
+    let mut now = bench.board.now();
+    for (number, block) in (0..).zip(image(1).chunks(BLOCK_BYTES)) {
+        let (file, record) = place_of(Slot::B, number);
+        let [[f1, f0], [r1, r0]] = [file, record].map(u16::to_be_bytes);
+        let mut bytes = vec![0, 0x15, 135, 6, f1, f0, r1, r0, 0, 64];
+        bytes.extend(block);
+        bytes.resize(10 + BLOCK_BYTES, 0xFF);
+        now = bench.board.line().send(now, &adu(&bytes)) + silence;
+        bench.board.run_until(now);
+    }
+    bench.board.run_for(ERASE);
+    let status = bench.update_status();
+    assert!(
+        status.missing > 0 && status.missing < status.blocks,
+        "{status:?}"
+    );
+    assert_eq!(bench.board.resets(), 1, "that of the first start");
 }
 
 /// Points are read and outputs written all the time, at every kind of rate; a reply waits for the erase of a page at
