@@ -1,4 +1,5 @@
-//! `cargo xtask sim`: builds the simulator and the loader and images that it needs, then replaces this process with the simulator.
+//! `cargo xtask sim`: builds the simulator and the loader and images that it needs, then replaces this process with the
+//! simulator.
 
 use std::ffi::OsString;
 use std::process::Command;

@@ -37,7 +37,7 @@ const WORKSPACES: [&str; 3] = ["Cargo.toml", fuzz::MANIFEST, peers::MANIFEST];
 /// instructions and of the flash, or on the converter.
 const AT_CORNERS: &str = "air::requests:: analog_inputs:: boot:: clock:: comm_watchdog:: counters:: dac_faults:: \
     flash_faults:: hung_task:: in_force:: loading::the_ noise:: outputs_at_start:: points:: power_cut:: pulses:: saving:: \
-    silences:: timing:: updating::a_power updating::the_ upsets::a_reply";
+    silences:: timing:: updating::cuts:: updating::service:: updating::the_ upsets::a_reply";
 const AT_CORNERS_08: &str = "analog:: boot:: power_cut:: saving:: timing::";
 
 /// Which command runs a step when no step is named.

@@ -7,8 +7,8 @@
 //!            (background)    (serve)    (background)           (background)
 //! ```
 //!
-//! The requests only note what is to be done; the background task does it, one step at a time ([`Job`]), so the device
-//! serves its points meanwhile. A block is in RAM until it is programmed, which takes up to 5 ms, and there is room for
+//! A request only notes what is to be done. The background task does it, one step at a time ([`Job`]), so the device
+//! serves its points during an update. A block is in RAM until it is programmed, which takes up to 5 ms, and there is room for
 //! two.
 
 mod missing;
@@ -108,8 +108,9 @@ pub struct Update {
 }
 
 impl Update {
-    /// Returns the update of a board with this code and this layout, which runs from `slot`. `images` are the running image and the other one, as
-    /// [`described`]. Without a `record`, the loader found the running image genuine and could not write it down.
+    /// Returns the update of a board with this code and this layout, which runs from `slot`. `images` are the running
+    /// image and the other one, as [`described`]. Without a `record`, the loader found the running image genuine and
+    /// could not write it down.
     #[must_use]
     pub fn new(
         board: u8,

@@ -395,7 +395,7 @@ fn orders_need_a_confirmed_image_and_a_genuine_one_to_go_back_to() {
     unit.update.images[1] = described(&unit.flash.bytes);
     unit.order(Order::GoBack);
     assert_eq!(unit.written[0].states[1], State::Trial(0));
-    // On trial nothing but the confirmation is possible.
+    // On trial only the confirmation is possible.
     unit.update.running.record.states[0] = State::Trial(1);
     assert!(unit.update.is_on_trial());
     assert_eq!(check(&unit), [false, false, true, false]);

@@ -98,7 +98,7 @@ fn order_that_was_checked_before_an_order_of_the_other_line_is_not_taken() {
     write_state(&mut bench);
     assert_eq!(bench.device.update.as_ref().unwrap().record(6), 54);
     bench.unlock();
-    // A restart does not replace the one that the boot state needs.
+    // The boot state has changed, so COMMAND 2 does not replace that restart.
     bench.device.restart = Some(Restart::Update);
     assert_eq!(bench.write(at::COMMAND, &[2]), Ok(()));
     assert_eq!(bench.device.restart, Some(Restart::Update));

@@ -1,0 +1,142 @@
+//! Images that must not start, and attacks.
+
+use super::*;
+
+/// Returns images for slot B that the loader refuses, each with the reason.
+fn refused_images() -> [(&'static str, u16, Vec<u8>); 7] {
+    let with = |at: usize, bits: u8| {
+        let mut image = image(1);
+        image[at] ^= bits;
+        image
+    };
+    let whole = |mut image: Vec<u8>| {
+        with_crc(&mut image);
+        image
+    };
+    let signed = |mut image: Vec<u8>| {
+        sign(&mut image);
+        image
+    };
+    [
+        ("version", 8, whole(with(9, 1))),
+        ("commit", 8, whole(with(24, 1))),
+        ("signature", 8, with(SIGNATURE, 1)),
+        ("key of somebody else", 8, with(SIGNATURE + 63, 0x10)),
+        ("signed, but another hash", 7, signed(with(HASH, 1))),
+        ("signed, but other code", 7, signed(with(20_000, 0x80))),
+        ("last byte", 7, whole(with(image(1).len() - 1, 1))),
+    ]
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn an_image_that_is_not_genuine_is_refused_and_the_old_one_runs() {
+    for (what, reason, image) in refused_images() {
+        let mut bench = with_changes(&image);
+        let (slot, status) = after(&mut bench);
+        let refused = (slot, status.state, status.reason);
+        assert_eq!(refused, (0, REJECTED, reason), "{what}");
+        assert_eq!(bench.order(Command::GoBack), Err(6), "{what}");
+        assert_eq!(bench.order(Command::Finish), Err(6), "{what}");
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn an_image_that_is_not_intact_is_refused_without_a_restart() {
+    let mut bench = running();
+    let last = image(1).len() - 1;
+    let changed = |at: usize| {
+        let mut image = image(1);
+        image[at] ^= 1;
+        image
+    };
+    for (what, reason, image) in [("code", 6, changed(last)), ("zero area", 1, changed(511))] {
+        bench.prepare();
+        bench.send(Slot::B, &image);
+        bench.board.run_for(ERASE);
+        assert_eq!(bench.order(Command::Finish), Ok(()));
+        bench.board.run_for(ERASE);
+        let status = bench.update_status();
+        assert_eq!((status.state, status.reason), (1, reason), "{what}");
+        assert_eq!(status.missing, status.blocks, "{what}");
+        assert_eq!(bench.board.resets(), 1, "that of the first start");
+    }
+    // What is right already is not written again.
+    bench.send(Slot::B, &image(1));
+    bench.board.run_for(ERASE);
+    assert_eq!(bench.update_status().missing, 0);
+    assert_eq!(bench.order(Command::Finish), Ok(()));
+    assert_eq!(after(&mut bench).0, 1);
+}
+
+/// Attack: a slot that was confirmed is prepared and filled with code that is not signed, and then chosen in every way.
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn code_that_is_not_signed_is_never_started() {
+    let mut bench = starting(UPDATED.clone());
+    assert_eq!(after(&mut bench).0, 1);
+    // Slot A was confirmed.
+    let mut forged = image(0);
+    forged[20_000] ^= 1;
+    with_crc(&mut forged);
+    bench.prepare();
+    bench.send(Slot::A, &forged);
+    bench.board.run_for(ERASE);
+    assert_eq!(bench.order(Command::GoBack), Err(6));
+    let mut switched = holding(bench.board.flash().to_vec(), 254);
+    switched.patience = ERASE;
+    answers_as(&mut switched, 255, START).expect("it starts");
+    assert_eq!(runs_from(&mut switched), 1);
+    // The image that runs is damaged.
+    let mut flash = bench.board.flash().to_vec();
+    let b = (LAYOUT.board.layout().slots[1] - 0x0800_0000) as usize;
+    flash[b + 20_000] ^= 1;
+    let mut damaged = holding(flash, 1);
+    damaged.board.run_for(CHECK);
+    assert!(damaged.board.leds().fault && damaged.board.pc() < LAYOUT.board.layout().slots[0]);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn an_image_of_an_older_epoch_is_never_started() {
+    let epoch = |slot, epoch| signed(slot, |image| image[6] = epoch);
+    let mut bench = unit_of([&epoch(0, 2), &[]]);
+    assert_eq!(
+        bench.records(5, 1),
+        [2],
+        "the floor is that of the first image"
+    );
+    bench.update(&epoch(1, 1));
+    let (slot, status) = after(&mut bench);
+    assert_eq!((slot, status.state, status.reason), (0, REJECTED, 5));
+    updated(&mut bench, &epoch(1, 3));
+    assert_eq!(bench.records(5, 1), [3]);
+    // The image in slot A is confirmed, and below the floor now.
+    assert_eq!(bench.update_status().state, CONFIRMED);
+    assert_eq!(bench.order(Command::GoBack), Err(6));
+    let mut switched = holding(bench.board.flash().to_vec(), 254);
+    answers_as(&mut switched, 255, START).expect("it starts");
+    assert_eq!(runs_from(&mut switched), 1);
+}
+
+/// Attack: the header of a new image is changed behind the application's back, with absurd bounds.
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn absurd_bounds_in_a_new_header_are_refused() {
+    for (at, number, reason) in [
+        (LENGTH, 0xFFFF_FFFC_u32, 4),
+        (LENGTH, 0x8000_0000, 4),
+        (LENGTH, 0, 4),
+        (LENGTH, 54 * 1024, 4),
+        (LENGTH - 4, 0xFFFF_FE00, 3),
+        (LENGTH - 4, 0x2000_0000, 3),
+    ] {
+        let mut header = image(1)[..APPLICATION].to_vec();
+        header[at..at + 4].copy_from_slice(&number.to_le_bytes());
+        let mut bench = with_changes(&header);
+        let (slot, status) = after(&mut bench);
+        let refused = (slot, status.state, status.reason);
+        assert_eq!(refused, (0, REJECTED, reason), "{number:#x} at {at}");
+    }
+}
