@@ -1,13 +1,14 @@
 //! Target `update`: a slot with any content, then two pages of the boot state with any content and a history: changes,
 //! starts, a power cut in any operation that leaves any mess.
 //!
-//! The header is compared with an independent reading, and no content may cause a panic or be called genuine. Every
-//! start must find the boot state that was written last or, after a power cut, the old or the new one; once it is
-//! settled, every later start finds the same.
+//! The header is compared with an independent reading, a manifest with the right one, and no content may cause a panic or
+//! be called genuine. Every start must find the boot state that was written last or, after a power cut, the old or the new
+//! one; once it is settled, every later start finds the same.
 //!
 //! ```text
 //!   script: bytes of the application (2 bytes), what replaces the header: place (2 bytes) and a string,
-//!           1 = the CRC-32 is made right;  two pages (a string each, filled up with one byte);  events
+//!           1 = the CRC-32 is made right;  what replaces a part of a manifest: place and a string;
+//!           two pages (a string each, filled up with one byte);  events
 //!   event:  0 change  preferred, states (2 bytes), floor (2 bytes)     1 a start
 //!           2 a cut   number of operations before it, mess
 //! ```
@@ -16,7 +17,7 @@ use board_support::pages::{Page, Pages};
 use loader::Record;
 use loader::genuine;
 use loader::journal::Journal;
-use register_map::update::{Reason, Slot, State, crc32, intact};
+use register_map::update::{Manifest, Reason, Slot, State, crc32, intact};
 
 use crate::PAGE_SIZE;
 use crate::flash::{Fault, MockFlash};
@@ -31,6 +32,7 @@ const ADDRESS: u32 = 0x0801_1800;
 pub fn run(input: &[u8]) {
     let mut script = Script::new(input);
     header(&mut script);
+    manifest(&mut script);
     let pages = [0; 2].map(|_| {
         let (bytes, fill) = (script.string(), script.byte());
         let mut page = [fill; PAGE_SIZE];
@@ -80,6 +82,27 @@ fn header(script: &mut Script<'_>) {
     let reason = refused.expect_err("nobody has signed it");
     assert_eq!(reason == Reason::Magic, !form);
     assert_eq!(reason == Reason::Length, form && !bounds);
+}
+
+/// Checks the manifest of a file whose body is one slot, with changes.
+fn manifest(script: &mut Script<'_>) {
+    let right = Manifest {
+        images: [[0, 1516], [1536, 512]],
+        hash: [0xA5; 64],
+    };
+    let mut bytes = right.encode();
+    let at = usize::from(script.byte()) % bytes.len();
+    let new = script.string();
+    let end = bytes.len().min(at + new.len());
+    bytes[at..end].copy_from_slice(&new[..end - at]);
+    let found = Manifest::decode(&bytes);
+    assert_eq!(found == Some(right), bytes == right.encode());
+    if let Some(found) = found {
+        let body = [0; SLOT];
+        for image in found.images_in(&body).into_iter().flatten() {
+            assert!(image.len() <= SLOT);
+        }
+    }
 }
 
 fn record(script: &mut Script<'_>) -> Record {

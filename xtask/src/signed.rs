@@ -7,7 +7,7 @@ use ed25519_dalek::{Signature, Signer as _, SigningKey, VerifyingKey};
 use fs_err as fs;
 use register_map::layout::HEADER;
 use register_map::part::FLASH_BASE;
-use register_map::update::{Slot, crc32, intact};
+use register_map::update::{BLOCK_BYTES, Manifest, Slot, crc32, intact};
 use register_map::{Board, first_32_bits};
 use semver::Version;
 use sha2::{Digest as _, Sha512};
@@ -16,9 +16,6 @@ use crate::build::Program;
 use crate::error::usage;
 use crate::workspace::Workspace;
 use crate::{build, image, keys};
-
-/// Bytes to which the images in the file are padded, and bytes of the manifest.
-const BLOCK: usize = 128;
 
 /// The options of `cargo xtask image`.
 #[derive(clap::Args, Debug)]
@@ -197,35 +194,29 @@ pub fn sign(image: &mut [u8], key: &SigningKey, epoch: u16) {
 /// Returns the file of an update: both images, each padded to 128 bytes, and the manifest.
 pub fn file(images: &[Vec<u8>; 2]) -> Vec<u8> {
     let mut file = Vec::new();
-    let mut manifest = b"MODM\x01\0\0\0".to_vec();
-    for image in images {
-        for number in [file.len(), image.len()] {
-            manifest.extend((number as u32).to_le_bytes());
-        }
+    let places = images.each_ref().map(|image| {
+        let place = [file.len(), image.len()].map(|number| number as u32);
         file.extend(image);
-        file.resize(file.len().next_multiple_of(BLOCK), 0xFF);
-    }
-    manifest.extend(Sha512::digest(&file));
-    manifest.resize(BLOCK - 4, 0);
-    let crc = crc32([&manifest, &[]]);
-    manifest.extend(crc.to_le_bytes());
-    file.extend(manifest);
+        file.resize(file.len().next_multiple_of(BLOCK_BYTES), 0xFF);
+        place
+    });
+    let manifest = Manifest {
+        images: places,
+        hash: Sha512::digest(&file).into(),
+    };
+    file.extend(manifest.encode());
     file
 }
 
 /// Returns the images in the file of an update. A damaged file is an error.
 pub fn images(file: &[u8]) -> Result<[Vec<u8>; 2]> {
     let damaged = "not the file of an update, or damaged";
-    let (body, manifest) = file.split_last_chunk::<BLOCK>().context(damaged)?;
-    let number = |at: usize| -> Option<usize> {
-        let bytes = manifest.get(at..at + 4)?.try_into().ok()?;
-        usize::try_from(u32::from_le_bytes(bytes)).ok()
-    };
-    let image = |at| {
-        let image = body.get(number(at)?..)?.get(..number(at + 4)?)?;
-        intact(image, crc32).is_ok().then(|| image.to_vec())
-    };
-    let images = [image(8), image(16)].map(|image| image.context(damaged));
+    let (body, manifest) = file.split_last_chunk().context(damaged)?;
+    let manifest = Manifest::decode(manifest).context(damaged)?;
+    let images = manifest.images_in(body).map(|image| {
+        let image = image.filter(|image| intact(image, crc32).is_ok());
+        image.map(<[u8]>::to_vec).context(damaged)
+    });
     let [a, b] = images;
     let images = [a?, b?];
     // What follows from the images must be what is in the file.
@@ -235,6 +226,8 @@ pub fn images(file: &[u8]) -> Result<[Vec<u8>; 2]> {
 
 #[cfg(test)]
 mod tests {
+    use register_map::board::MODIO_02;
+
     use super::*;
     use crate::image::sample::{code, elf};
 
@@ -243,7 +236,6 @@ mod tests {
         sign(&mut image, key, epoch);
         Ok(image)
     }
-    use register_map::board::MODIO_02;
 
     #[test]
     fn image_of_a_slot_is_intact_and_signed_for_its_address() {

@@ -1,9 +1,11 @@
 //! What an update over the line brings and reports: slots, their states, and the header of an image.
 
 mod header;
+mod manifest;
 mod transfer;
 
 pub use header::{Header, crc32, intact};
+pub use manifest::Manifest;
 pub use transfer::{BLOCK, BLOCK_BYTES, block_at, place_of, status};
 
 /// One of the two places for an image.

@@ -14,6 +14,7 @@ use crate::device::{Device, fetch};
 use crate::failure::Failure;
 use crate::names::{Item, Meaning};
 use crate::output;
+use crate::update::state_text;
 use crate::value::{Shown, show, text};
 
 /// Names of the first objects of the device identification (V1.1b3, 6.21).
@@ -105,16 +106,7 @@ fn slots(word: u16) -> String {
     let code = (word >> update::OTHER_SHIFT & 0b111) as u8;
     // A rejected image has a reason, which the register does not contain.
     let detail = if code == 6 { 1 } else { 0 };
-    let other_state = match State::from_code(code, detail) {
-        Some(State::Empty) => "empty",
-        Some(State::Receiving) => "receiving",
-        Some(State::New) => "not checked yet",
-        Some(State::Checking) => "being checked",
-        Some(State::Trial(_)) => "on trial",
-        Some(State::Confirmed) => "confirmed",
-        Some(State::Rejected(_)) => "rejected",
-        None => "unknown",
-    };
+    let other_state = State::from_code(code, detail).map_or("unknown", state_text);
     format!(
         "slot {runs} runs, {}{}; slot {other} {other_state}",
         is_set(update::TRIAL, "on trial", "confirmed"),

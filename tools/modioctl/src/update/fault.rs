@@ -3,7 +3,7 @@
 use std::fmt;
 
 use modbus_line::names;
-use register_map::update::Reason;
+use register_map::update::{Reason, State};
 
 /// Why a unit takes no further part. The texts say what to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,6 +73,19 @@ impl fmt::Display for Fault {
                 "runs the image, but has not confirmed it: run the same command again within 15 minutes"
             }
         })
+    }
+}
+
+/// Describes the state of a slot.
+pub const fn state_text(state: State) -> &'static str {
+    match state {
+        State::Empty => "empty",
+        State::Receiving => "receiving",
+        State::New => "not checked yet",
+        State::Checking => "being checked",
+        State::Trial(_) => "on trial",
+        State::Confirmed => "confirmed",
+        State::Rejected(_) => "rejected",
     }
 }
 

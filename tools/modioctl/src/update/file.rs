@@ -4,17 +4,10 @@ use std::fmt;
 use std::path::Path;
 
 use register_map::Board;
-use register_map::update::{BLOCK_BYTES, Header, Slot, crc32, intact};
+use register_map::update::{BLOCK_BYTES, Header, Manifest, Slot, crc32, intact};
 use sha2::{Digest as _, Sha512};
 
 use crate::failure::Failure;
-
-/// First bytes of the manifest: magic and format.
-const MAGIC: [u8; 8] = *b"MODM\x01\0\0\0";
-/// Position of the hash in the manifest. Offset and length of each image are between the magic and the hash.
-const HASH: usize = 24;
-/// Position of the CRC-32 in the manifest.
-const CRC: usize = BLOCK_BYTES - 4;
 
 /// The largest file that is read. Two slots of the largest part have less than a quarter of it.
 const MOST: u64 = 1 << 20;
@@ -89,22 +82,13 @@ impl File {
     pub fn of(bytes: &[u8]) -> Result<Self, String> {
         let (body, manifest) = bytes
             .split_last_chunk::<BLOCK_BYTES>()
-            .filter(|(_, manifest)| manifest.starts_with(&MAGIC))
+            .filter(|(_, manifest)| Manifest::is_one(manifest))
             .ok_or("not the file of an update, or cut short: a .modio file is needed")?;
-        let number = |at: usize| {
-            let bytes = manifest.get(at..).and_then(|rest| rest.first_chunk());
-            u32::from_le_bytes(bytes.copied().unwrap_or_default())
-        };
-        if number(CRC) != crc32([&manifest[..CRC], &[]])
-            || Sha512::digest(body)[..] != manifest[HASH..HASH + 64]
-        {
-            return Err("the file is damaged: copy it again".to_owned());
-        }
-        let part = |at: usize| {
-            let first = number(at) as usize;
-            body.get(first..)?.get(..number(at + 4) as usize)
-        };
-        let [a, b] = [8, 16].map(|at| part(at).ok_or("the manifest names no image in the file"));
+        let manifest = Manifest::decode(manifest)
+            .filter(|manifest| Sha512::digest(body)[..] == manifest.hash)
+            .ok_or("the file is damaged: copy it again")?;
+        let parts = manifest.images_in(body);
+        let [a, b] = parts.map(|part| part.ok_or("the manifest names no image in the file"));
         let (board, a) = image(a?, Slot::A)?;
         let (other, b) = image(b?, Slot::B)?;
         if board != other || a.words[..5] != b.words[..5] {

@@ -14,7 +14,7 @@ mod unit;
 mod tests;
 
 pub use campaign::{Campaign, Patience, Step};
-pub use fault::{Fault, reason_text};
+pub use fault::{Fault, reason_text, state_text};
 pub use file::{File, Image};
 pub use messages::{Status, read_status};
 pub use unit::{Stage, Unit};

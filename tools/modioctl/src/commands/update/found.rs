@@ -9,7 +9,7 @@ use register_map::update::{Reason, Slot, State, status};
 use crate::device::Device;
 use crate::failure::Failure;
 use crate::update::file::Version;
-use crate::update::{File, Stage, Status, Unit};
+use crate::update::{File, Stage, Status, Unit, reason_text, state_text};
 use crate::value::long;
 
 /// A unit before the update.
@@ -94,23 +94,18 @@ impl Found {
         let Status { images, .. } = &self.status;
         let [_, other] = images;
         let version = Version(other);
-        match self.status.state {
-            None => "unknown state".to_owned(),
-            Some(State::Empty) => "empty".to_owned(),
-            Some(State::Receiving) => format!(
-                "receiving, {} of {} blocks missing",
+        let Some(state) = self.status.state else {
+            return "unknown state".to_owned();
+        };
+        let text = state_text(state);
+        match state {
+            State::Empty => text.to_owned(),
+            State::Receiving => format!(
+                "{text}, {} of {} blocks missing",
                 self.status.missing, self.status.blocks
             ),
-            Some(State::New) => format!("{version}, not checked yet"),
-            Some(State::Checking) => format!("{version}, being checked"),
-            Some(State::Trial(_)) => format!("{version}, on trial"),
-            Some(State::Confirmed) => format!("{version}, confirmed"),
-            Some(State::Rejected(reason)) => {
-                format!(
-                    "{version}, rejected: {}",
-                    crate::update::reason_text(reason)
-                )
-            }
+            State::Rejected(reason) => format!("{version}, {text}: {}", reason_text(reason)),
+            _ => format!("{version}, {text}"),
         }
     }
 
