@@ -45,7 +45,6 @@ impl Unit {
         let fixed = const { &Fixed::of(&MODIO_02) };
         let mut device = Device::new(Config::new(&MODIO_02, settings, false), identity, fixed);
 
-        let [port] = device.points.ports_mut();
         let mut inputs = Channels::new();
         if line.contains("Inputs 1 and 3 are energised") {
             inputs.set_bit(0, true);
@@ -54,9 +53,9 @@ impl Unit {
         if line.contains("Input 1 has 5 V") {
             inputs.set_word(0, 0x0800);
         }
-        port.scanned(&inputs, true);
+        device.scanned(0, &inputs, true, false);
         if line.contains("does not answer") {
-            port.set_failing(0b1111);
+            device.points.ports_mut()[0].set_failing(0b1111);
         }
 
         let is_ascii = line.contains("in ASCII mode");

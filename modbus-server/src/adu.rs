@@ -87,6 +87,25 @@ impl Adu {
         self.len = self.len.saturating_sub(count);
     }
 
+    /// Discards the first `count` bytes.
+    pub(crate) fn drop_front(&mut self, count: usize) {
+        let count = count.min(self.len);
+        self.bytes.copy_within(count..self.len, 0);
+        self.len -= count;
+    }
+
+    /// Inserts `count` bytes at the front, with any content. Returns `false` and changes nothing when less than the two
+    /// bytes of a CRC would be left free.
+    pub(crate) fn add_front(&mut self, count: usize) -> bool {
+        let (from, to) = (self.len, self.len + count);
+        if to + 2 > Self::CAPACITY {
+            return false;
+        }
+        self.bytes.copy_within(..from, count);
+        self.len = to;
+        true
+    }
+
     /// Discards the content.
     #[inline]
     pub const fn clear(&mut self) {

@@ -71,7 +71,7 @@ const ROWS: [Row; 2] = [
             part: STM32F103CB,
             smaller: Some(STM32F103C8),
             stack: 9 * KIB,
-            budget: [52 * KIB, 9 * KIB + 512],
+            budget: [52 * KIB, 10 * KIB + 512],
         },
     },
     // The larger board with an STM32F103RC: four slots, ports 1 to 4.

@@ -30,6 +30,7 @@ pub mod codes;
 mod commit;
 pub mod configuration;
 pub mod counters;
+pub mod edges;
 pub mod fault;
 mod kind;
 pub mod layout;
@@ -57,11 +58,12 @@ pub use value::{Unit, Value};
 pub use values::Values;
 
 /// Every block, in ascending order of the addresses.
-pub static BLOCKS: [&Block; 6] = [
+pub static BLOCKS: [&Block; 7] = [
     &points::BLOCK,
     &configuration::BLOCK,
     &state::BLOCK,
     &fault::BLOCK,
     &radio::BLOCK,
     &counters::BLOCK,
+    &edges::BLOCK,
 ];

@@ -109,7 +109,7 @@ fn the_configuration_matches_the_numbers_written_by_hand() {
 #[test]
 fn the_state_registers_are_readable_except_for_gaps() {
     let there = |start, count| runs(state::RULES, start, count).is_some();
-    for (start, count) in [(0x200, 38), (0x230, 9), (0x240, 32)] {
+    for (start, count) in [(0x200, 40), (0x230, 9), (0x240, 32)] {
         assert!(there(start, count), "{start:#06x}");
         assert!(
             !there(start, count + 1) && !there(start - 1, 2),
@@ -119,13 +119,14 @@ fn the_state_registers_are_readable_except_for_gaps() {
     assert!(runs(fault::RULES, 0x260, 16).is_some());
     assert!(runs(radio::RULES, 0x270, 9).is_some() && runs(radio::RULES, 0x270, 10).is_none());
     assert!(runs(counters::RULES, 0x300, 64).is_some() && counters::of_point(16) == 0x320);
+    assert!(runs(edges::RULES, 0x380, 64).is_some() && runs(edges::RULES, 0x380, 65).is_none());
 }
 
 #[test]
 fn spans_are_the_addresses_of_the_rules_with_adjacent_ones_joined() {
     assert_eq!(
         state::SPANS,
-        [0x200..0x226, 0x22A..0x22B, 0x230..0x239, 0x240..0x260]
+        [0x200..0x228, 0x22A..0x22B, 0x230..0x239, 0x240..0x260]
     );
     let blocks = [
         (configuration::RULES, configuration::SPANS),
@@ -133,6 +134,7 @@ fn spans_are_the_addresses_of_the_rules_with_adjacent_ones_joined() {
         (fault::RULES, fault::SPANS),
         (radio::RULES, radio::SPANS),
         (counters::RULES, counters::SPANS),
+        (edges::RULES, edges::SPANS),
     ];
     for (rules, spans) in blocks {
         let of_rules = rules.iter().flat_map(|rule| rule.addresses());

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use register_map::points::Kind;
 use register_map::{
     BLOCKS, Block, Board, InForce, Module, Rule, Scope, Text, Unit, Value, Values, codes,
-    configuration, counters, fault, points,
+    configuration, counters, edges, fault, points,
 };
 
 const INTRODUCTION: &str = "\
@@ -61,6 +61,11 @@ const COUNTER_NOTES: &str = "
 A counter wraps. A write of 0 to both registers of a point in one request clears the counter. Any other write is exception 03.
 ";
 
+const EDGE_NOTES: &str = "
+The uptime is that of 0x0226. File 3 (function 14) is the log of the last 64 edges of all digital inputs:
+[time-and-links.md](time-and-links.md).
+";
+
 const FAULT_NOTES: &str = "
 The record survives every reset but a loss of power. A new fault replaces it. Line repairs start at 0 with each start and
 stop at 65535.
@@ -108,6 +113,8 @@ fn write_markdown(out: &mut impl Write) -> Result {
             out.write_str(FAULT_NOTES)?;
         } else if block.first == counters::BLOCK.first {
             out.write_str(COUNTER_NOTES)?;
+        } else if block.first == edges::BLOCK.first {
+            out.write_str(EDGE_NOTES)?;
         }
     }
     Ok(())

@@ -18,6 +18,8 @@ use crate::{
 /// Scans per run of the background task, and scans per check that every other task still runs.
 const SCANS_PER_BACKGROUND: u8 = TICK_MS as u8;
 const SCANS_PER_PROOF: u8 = 16;
+/// Longest time between two scans, in ms, unless flash is erased, which takes 20 ms at least.
+const LONGEST_MS: u32 = 2;
 
 /// The modules and the state of their scans.
 pub struct Scanning {
@@ -68,10 +70,9 @@ impl Scanning {
         events: &mut Producer<'static, Event>,
     ) -> bool {
         let now = clock::millis();
-        let (mut channels, uptime_s, beat, tripped) = device.lock(|device| {
+        let (mut channels, uptime_s, passed, tripped) = device.lock(|device| {
             let passed = now.wrapping_sub(device.state.millis());
-            let beat = passed > 0;
-            let tripped = beat && device.tick(passed);
+            let tripped = passed > 0 && device.tick(passed);
             let ports = device.points.ports();
             // Under the same lock as the words, because the settings define the units of the words.
             let revision = device.config.revision();
@@ -85,8 +86,9 @@ impl Scanning {
             for (channels, port) in channels.iter_mut().zip(ports) {
                 *channels = *port.channels();
             }
-            (channels, device.state.uptime_s(), beat, tripped)
+            (channels, device.state.uptime_s(), passed, tripped)
         });
+        let beat = passed > 0;
 
         let mut results = [Ok(()); SLOTS];
         let modules = self.modules.iter_mut().zip(&channels);
@@ -105,10 +107,14 @@ impl Scanning {
         }
         device.lock(|device| {
             let words = self.revision == device.config.revision();
-            let ports = device.points.ports_mut().iter_mut().enumerate();
-            for ((slot, port), (channels, result)) in ports.zip(channels.iter().zip(results)) {
+            for (slot, (channels, result)) in channels.iter().zip(results).enumerate() {
                 if beat {
-                    port.scanned(channels, words);
+                    device.scanned(slot, channels, words, passed > LONGEST_MS);
+                }
+                let Some(port) = device.points.ports_mut().get_mut(slot) else {
+                    continue;
+                };
+                if beat {
                     kept::keep_pulses(slot, port.pulses());
                 }
                 if take_failures(port, result, beat) {

@@ -6,6 +6,7 @@
 //!   +--------------v---------------------------------------------+
 //!   | points    the value of every channel                        |<--> scan, 1 kHz
 //!   | pulses    counters of digital inputs                        |
+//!   | edges     time of each input's last edge, log of all edges  |
 //!   | config    settings, lock, commands                          |<--> store, in flash
 //!   | state     identity, counters, health                        |<--- all tasks
 //!   +-------------------------------------------------------------+
@@ -16,6 +17,7 @@
 
 mod comm_watchdog;
 mod description;
+mod edge_log;
 mod identification;
 mod points;
 mod port;
@@ -29,14 +31,15 @@ use core::ops::Range;
 use modbus_server::{
     Bits, BitsOut, DataModel, Exception, Server, Span, Table, TextOut, Words, WordsOut,
 };
-use modio_drivers::CHANNELS;
+use modio_drivers::{CHANNELS, Channels};
 use register_map::configuration::COMMAND;
 use register_map::update::status;
-use register_map::{codes::Command, counters, fault, radio, state as state_map};
+use register_map::{codes::Command, counters, edges, fault, radio, state as state_map};
 
 pub use comm_watchdog::CommWatchdog;
 use description::Description;
 pub use description::Fixed;
+use edge_log::EdgeLog;
 pub use points::Points;
 pub use port::IoPort;
 pub use state::{Identity, State};
@@ -55,6 +58,7 @@ pub struct Device<const SLOTS: usize> {
     pub state: State,
     description: Description,
     comm_watchdog: CommWatchdog,
+    edges: EdgeLog,
     /// A command from a request, to be executed when its reply has been sent.
     ordered: Option<Command>,
     /// The device is to restart once no save is under way.
@@ -88,6 +92,7 @@ enum Block {
     Fault,
     Radio,
     Pulses,
+    Edges,
 }
 
 impl Block {
@@ -108,7 +113,8 @@ impl Block {
             [2, 0x00..=0x5F] => Self::State,
             [2, 0x60..=0x6F] => Self::Fault,
             [2, _] => Self::Radio,
-            [3, _] => Self::Pulses,
+            [3, 0x00..=0x7F] => Self::Pulses,
+            [3, _] => Self::Edges,
             _ => Self::Points,
         }
     }
@@ -125,6 +131,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
             state: State::new(config.board(), identity),
             description: Description::new(description, &config),
             comm_watchdog: CommWatchdog::new(),
+            edges: EdgeLog::new(),
             ordered: None,
             restart: None,
             update: None,
@@ -172,6 +179,32 @@ impl<const SLOTS: usize> Device<SLOTS> {
             self.points.ports_mut().iter_mut().for_each(IoPort::go_safe);
         }
         tripped
+    }
+
+    /// Stores the inputs that a scan of a slot has read. `words` is false when the settings have changed since the scan
+    /// began: then the words of the scan have the wrong unit. `late`: the scan before this one was some milliseconds ago,
+    /// because flash was erased.
+    pub fn scanned(&mut self, slot: usize, channels: &Channels, words: bool, late: bool) {
+        // 0 stands for an input without an edge.
+        let now = self.state.millis().max(1);
+        if late {
+            self.edges.set_late(now);
+        }
+        let first = self.points.first_of(slot);
+        let Some(port) = self.points.ports_mut().get_mut(slot) else {
+            return;
+        };
+        let edges = port.scanned(channels, words, now);
+        if edges == 0 {
+            return;
+        }
+        for (channel, settings) in port.settings().iter().enumerate() {
+            if edges >> channel & 1 != 0 {
+                let point = first.wrapping_add(channel as u16);
+                self.edges
+                    .add(point, channels.bit(channel), now, settings.filter);
+            }
+        }
     }
 
     /// Restarts the communication watchdog, unless COMM_SOURCE excludes the request: a valid request for this unit ended
@@ -323,6 +356,7 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
             Block::Fault => check_exists(fault::SPANS, span),
             Block::Radio => check_exists(radio::SPANS, span),
             Block::Pulses => check_exists(counters::SPANS, span),
+            Block::Edges => check_exists(edges::SPANS, span),
         }
     }
 
@@ -341,7 +375,9 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
                 }
                 checked
             }
-            Block::State | Block::Fault | Block::Radio => Err(Exception::IllegalDataAddress),
+            Block::State | Block::Fault | Block::Radio | Block::Edges => {
+                Err(Exception::IllegalDataAddress)
+            }
             Block::Pulses => {
                 check_exists(counters::SPANS, span)?;
                 points::check_clear(span, words)?;
@@ -375,9 +411,9 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
             Block::Fault => span
                 .addresses()
                 .for_each(|address| out.push(self.state.fault_word(address))),
-            Block::Pulses => span
+            Block::Pulses | Block::Edges => span
                 .addresses()
-                .for_each(|address| out.push(self.points.pulse_word(address))),
+                .for_each(|address| out.push(self.points.input_word(address))),
         }
     }
 
@@ -393,12 +429,12 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
             }
             Block::Pulses => self.points.clear_pulses(span),
             // `check_write_words` rejects writes to these blocks.
-            Block::State | Block::Fault | Block::Radio => {}
+            Block::State | Block::Fault | Block::Radio | Block::Edges => {}
         }
     }
 
-    /// The self-description is file 1. Behind the loader, file 2 is the state of an update, and the images are files
-    /// that can be written.
+    /// The self-description is file 1, the log of edges file 3. Behind the loader, file 2 is the state of an update, and the
+    /// images are files that can be written.
     fn has_files(&self) -> bool {
         true
     }
@@ -409,6 +445,9 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
         {
             return update.check_read(records);
         }
+        if file == edges::log::FILE {
+            return EdgeLog::check_read(records);
+        }
         self.description.check_read::<SLOTS>(file, records)
     }
 
@@ -418,6 +457,10 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
         {
             let records = records.addresses();
             return records.for_each(|record| out.push(update.record(record)));
+        }
+        if file == edges::log::FILE {
+            let records = records.addresses();
+            return records.for_each(|record| out.push(self.edges.record(record)));
         }
         self.description.read(&self.config, records, out);
     }

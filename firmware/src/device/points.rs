@@ -4,7 +4,7 @@ use core::ops::Range;
 
 use modbus_server::{Bits, BitsOut, Exception, Span, Words, WordsOut};
 use modio_drivers::{CHANNELS, ChannelStatus, Kind};
-use register_map::{Module, counters, limits};
+use register_map::{Module, counters, edges, limits, points};
 
 use super::port::IoPort;
 
@@ -35,6 +35,12 @@ impl<const SLOTS: usize> Points<SLOTS> {
     /// Returns the ports with a slot, to be changed.
     pub const fn ports_mut(&mut self) -> &mut [IoPort; SLOTS] {
         &mut self.ports
+    }
+
+    /// Returns the address of the first point of a port, given the port's index.
+    #[must_use]
+    pub const fn first_of(&self, index: usize) -> u16 {
+        self.first.wrapping_add((index * CHANNELS) as u16)
     }
 
     /// Returns whether a channel of any port cannot be read or driven.
@@ -194,14 +200,27 @@ impl<const SLOTS: usize> Points<SLOTS> {
         }
     }
 
-    /// Returns a register of the pulse counters: 0 for a point that does not exist or is not a digital input.
+    /// Returns a register of the pulse counters or of the last edges: 0 for a point that does not exist or is not a
+    /// digital input.
     #[must_use]
-    pub fn pulse_word(&self, address: u16) -> u16 {
-        let offset = address.wrapping_sub(counters::PULSES);
-        let place = self.place(self.index(offset / counters::WORDS));
-        let pulses = place.and_then(|(port, channel)| port.pulses().get(channel));
-        let [high, low] = words_of(pulses.copied().unwrap_or_default());
-        if offset.is_multiple_of(2) { high } else { low }
+    pub fn input_word(&self, address: u16) -> u16 {
+        // Both blocks begin at a multiple of their length.
+        let place =
+            self.place(self.index(address % (points::COUNT * counters::WORDS) / counters::WORDS));
+        let value = place.and_then(|(port, channel)| {
+            let values = if address < edges::LAST_EDGE {
+                port.pulses()
+            } else {
+                port.edges()
+            };
+            values.get(channel)
+        });
+        let [high, low] = words_of(value.copied().unwrap_or_default());
+        if address.is_multiple_of(counters::WORDS) {
+            high
+        } else {
+            low
+        }
     }
 
     /// Clears the counters of a span that `check_clear` has accepted.

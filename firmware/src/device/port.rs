@@ -15,6 +15,8 @@ pub struct IoPort {
     /// SAFE in force of each channel; `None` holds the output.
     safe: [Option<u16>; CHANNELS],
     pulses: [u32; CHANNELS],
+    /// Uptime of the last edge of each digital input in ms; 0 without one.
+    edges: [u32; CHANNELS],
     /// The inputs have been scanned once. From then on a rising edge counts.
     scanned: bool,
     /// Channels that cannot be read or driven, channel 1 in bit 0.
@@ -31,6 +33,7 @@ impl IoPort {
             channels: Channels::new(),
             safe: [None; CHANNELS],
             pulses: [0; CHANNELS],
+            edges: [0; CHANNELS],
             scanned: false,
             failing: 0,
         }
@@ -67,16 +70,20 @@ impl IoPort {
 
     /// Stores the inputs of a scan. Outputs keep their commanded values, which may have changed during the scan.
     /// The settings may have changed, too: then the words of the scan have the wrong unit and are ignored (`words`
-    /// is false).
-    pub fn scanned(&mut self, scanned: &Channels, words: bool) {
-        for (channel, (kind, pulses)) in self.kinds.iter().zip(&mut self.pulses).enumerate() {
+    /// is false). `now` is the uptime in ms, not 0. Returns the digital inputs that have changed, channel 1 in bit 0.
+    pub fn scanned(&mut self, scanned: &Channels, words: bool, now: u32) -> u8 {
+        let mut changed = 0;
+        let inputs = self.pulses.iter_mut().zip(&mut self.edges);
+        for (channel, (kind, (pulses, edge))) in self.kinds.iter().zip(inputs).enumerate() {
             match kind {
                 Kind::BitInput => {
-                    let now = scanned.bit(channel);
-                    if self.scanned && now && !self.channels.bit(channel) {
-                        *pulses = pulses.wrapping_add(1);
+                    let level = scanned.bit(channel);
+                    if self.scanned && level != self.channels.bit(channel) {
+                        changed |= 1 << channel;
+                        *edge = now;
+                        *pulses = pulses.wrapping_add(level.into());
                     }
-                    self.channels.set_bit(channel, now);
+                    self.channels.set_bit(channel, level);
                 }
                 Kind::WordInput if words => {
                     self.channels.set_word(channel, scanned.word(channel));
@@ -86,6 +93,13 @@ impl IoPort {
             }
         }
         self.scanned = true;
+        changed
+    }
+
+    /// Returns the uptime of the last edge of each digital input in ms; 0 without one.
+    #[must_use]
+    pub const fn edges(&self) -> &[u32; CHANNELS] {
+        &self.edges
     }
 
     /// Stores which channels cannot be read or driven, channel 1 in bit 0.

@@ -143,6 +143,7 @@ impl State {
     ) -> u16 {
         let [product_high, product_low] = words_of(at::PRODUCT);
         let [uptime_high, uptime_low] = words_of(self.uptime_s);
+        let [millis_high, millis_low] = words_of(self.millis);
         let [commit_high, commit_low] = words_of(built::COMMIT);
         let [version, patch] = VERSION;
         match address {
@@ -156,6 +157,8 @@ impl State {
             at::RESET_CAUSE => self.identity.reset_cause.into(),
             at::UPTIME => uptime_high,
             0x0209 => uptime_low,
+            at::UPTIME_MS => millis_high,
+            0x0227 => millis_low,
             at::STACK_FREE => self.stack_free,
             at::COMMIT => commit_high,
             0x020D => commit_low,

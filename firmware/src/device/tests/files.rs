@@ -4,7 +4,7 @@ use super::*;
 
 impl<const SLOTS: usize> Bench<SLOTS> {
     /// Reads records of a file in one request. Returns the exception, or the bytes of all groups.
-    fn read_file(&mut self, groups: &[(u16, u16, u16)]) -> Result<Vec<u8>, u8> {
+    pub(super) fn read_file(&mut self, groups: &[(u16, u16, u16)]) -> Result<Vec<u8>, u8> {
         let mut pdu = std::vec![0x14, groups.len() as u8 * 7];
         for (file, record, count) in groups {
             let [[f1, f0], [r1, r0], [c1, c0]] = [*file, *record, *count].map(u16::to_be_bytes);
@@ -100,7 +100,7 @@ fn each_record_can_be_read_alone() {
 #[test]
 fn other_files_return_illegal_data_address() {
     let mut bench = Bench::new(Module::None, &[]);
-    for file in [0, 2, 3, 0x100, 0x101, 0xFFFF] {
+    for file in [0, 2, 4, 0x100, 0x101, 0xFFFF] {
         assert_eq!(bench.read_file(&[(file, 0, 1)]), Err(2), "file {file}");
         assert_eq!(bench.read_file(&[(1, 0, 1), (file, 0, 1)]), Err(2));
     }

@@ -2,6 +2,7 @@
 
 extern crate std;
 
+mod edges;
 mod files;
 mod over_the_air;
 mod points;
@@ -116,9 +117,8 @@ impl<const SLOTS: usize> Bench<SLOTS> {
 
     /// Runs a scan of the port with this index.
     fn scan_port(&mut self, index: usize, set: impl FnOnce(&mut modio_drivers::Channels)) {
-        let port = &mut self.device.points.ports_mut()[index];
-        let mut channels = *port.channels();
+        let mut channels = *self.device.points.ports()[index].channels();
         set(&mut channels);
-        port.scanned(&channels, true);
+        self.device.scanned(index, &channels, true, false);
     }
 }
