@@ -42,7 +42,7 @@ impl Master {
         let window = bits(13) + Time::from_us(50);
         let start = bits(39).max(bits(12) + Time::from_us(800));
         let arbitration = start + Time::from_ps(window.as_ps() * windows);
-        let reply = self.settings.characters(72);
+        let reply = self.settings.characters(72) + Time::from_ms(2);
         self.bus.run_until(end + arbitration + reply);
         let received = self.bus.line().take_received();
         let bytes: Vec<u8> = received.iter().map(|received| received.byte).collect();
@@ -133,6 +133,85 @@ fn a_scan_finds_every_unit_once_also_two_with_one_address() {
             let (reply, _) = master.ask(&request, 0).expect("a reply");
             assert_eq!(reply[..3], [0xFD, 0x46, 9]);
             assert_eq!(reply[7..], [3, 2, 0, unit]);
+        }
+    }
+}
+
+/// Changes input `channel` (1 to 4) of unit `n` on the bus.
+fn set_input(master: &mut Master, n: usize, channel: usize, on: bool) {
+    let board = master.bus.board_mut(n);
+    let change = board.change_slot(PORT as u8, |slot| slot.set_energised(channel, on));
+    change.expect("the port has a slot").expect("an input");
+}
+
+/// Switches the report of the start off and the events of the inputs of a unit on: 1 low, 2 high priority.
+fn switch_on(master: &mut Master, unit: u8, setting: u8) {
+    let mut request = vec![unit, 0x46, 0x18, 13, 0x0F, 0, 0, 1, 0, 2, 0, FIRST, 4];
+    request.extend([setting; 4]);
+    let (reply, _) = master.ask(&request, 0).expect("a reply");
+    assert_eq!(reply, [unit, 0x46, 0x18, 2, 0, 0b1111]);
+}
+
+/// Fetches until nobody has events. Returns unit, number of the input and level of each event.
+fn fetch_all(master: &mut Master) -> Vec<(u8, u8, u8)> {
+    let (mut events, mut last) = (Vec::new(), (0, 0));
+    loop {
+        let reply = master.fetch(last.0, last.1);
+        let [unit, 0x46, 0x11, flag, _, _, packet @ ..] = &reply[..] else {
+            assert_eq!(reply, [0xFD, 0x46, 0x12]);
+            return events;
+        };
+        last = (*unit, *flag);
+        // The packet with the start, which was not confirmed, is sent again.
+        for event in packet.chunks(5).filter(|event| *event != [0, 0x0F, 0, 0]) {
+            let [1, 2, 0, id, level] = event else {
+                panic!("{packet:02X?}");
+            };
+            events.push((*unit, id - FIRST + 1, *level));
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn events_come_from_the_unit_that_has_them_high_ones_first() {
+    // The last one has no crystal: it takes no part, and does not disturb the others.
+    let units = [(1, Some(-200)), (2, Some(200)), (247, Some(0)), (3, None)];
+    for (baud, format) in [(Baud::B9600, 0), (Baud::B115200, 1), (Baud::B921600, 0)] {
+        let mut master = Master::new(baud, format, &units);
+        // Each unit reports its start first.
+        assert_eq!(master.fetch(0, 0), [1, 0x46, 0x11, 0, 1, 4, 0, 0x0F, 0, 0]);
+        for (unit, setting) in [(1, 1), (2, 2), (247, 1), (3, 2)] {
+            switch_on(&mut master, unit, setting);
+        }
+        let states = fetch_all(&mut master);
+        let all = |units: &[u8]| -> Vec<_> {
+            units
+                .iter()
+                .flat_map(|unit| (1..=4).map(|n| (*unit, n, 0)))
+                .collect()
+        };
+        assert_eq!(states, all(&[2, 1, 247]), "{baud:?}");
+        for _ in 0..2 {
+            assert_eq!(fetch_all(&mut master), []);
+        }
+        for level in [1, 0] {
+            for n in 0..4 {
+                set_input(&mut master, n, 2, level == 1);
+            }
+            master.bus.run_for(Time::from_ms(20));
+            let expected = [2, 1, 247].map(|unit| (unit, 2, level));
+            assert_eq!(fetch_all(&mut master), expected, "{baud:?}");
+            // A master that knows nothing of it polls between.
+            for unit in [1, 2, 3, 247] {
+                let (reply, _) = master.ask(&[unit, 2, 0, FIRST, 0, 4], 0).expect("a reply");
+                assert_eq!(reply, [unit, 2, 1, level << 1], "{baud:?}");
+            }
+        }
+        // No error was counted, also by the unit that takes no part.
+        for unit in [1, 2, 3, 247] {
+            let (reply, _) = master.ask(&[unit, 4, 2, 0x31, 0, 1], 0).expect("a reply");
+            assert_eq!(reply, [unit, 4, 2, 0, 0], "{baud:?}");
         }
     }
 }
