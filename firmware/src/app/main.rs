@@ -81,7 +81,6 @@ mod app {
     struct Local {
         scan_timer: ScanTimer,
         upkeep: Upkeep,
-        radio_polling: Polling,
         serving: Serving,
         scanning: Scanning,
         radio_is_on: bool,
@@ -122,7 +121,6 @@ mod app {
                 radio_is_on,
                 scan_timer: started.scan_timer,
                 upkeep,
-                radio_polling: Polling::new(),
                 serving: started.serving,
                 scanning: started.scanning,
                 events,
@@ -231,13 +229,13 @@ mod app {
         }
     }
 
-    #[task(binds = EXTI4, priority = 2, local = [radio_polling], shared = [radio, device])]
+    #[task(binds = EXTI4, priority = 2, local = [polling: Polling = Polling::new()], shared = [radio, device])]
     fn radio(cx: radio::Context) {
         alive::begin(kept::marks(), Task::Radio);
         let mut shared = cx.shared;
         let waits = cx
             .local
-            .radio_polling
+            .polling
             .run(&mut shared.radio, &mut shared.device);
         if waits {
             rtic::pend(Interrupt::EXTI3);

@@ -114,7 +114,7 @@ pub fn up(
         internal_oscillator: !board.clock.is_crystal(),
         build: build(board.development),
     };
-    let device = place.write(Device::new(config, identity, DESCRIPTION));
+    let device = Device::new_in(place, config, identity, DESCRIPTION);
     let updating = Updating::new(&mut pages, board.crc);
     device.update = updating.update(&mut pages, board.chosen);
     for (slot, port) in device.points.ports_mut().iter_mut().enumerate() {

@@ -27,7 +27,7 @@ mod state;
 #[cfg(test)]
 mod tests;
 
-use core::ops::Range;
+use core::{mem::MaybeUninit, ops::Range};
 
 use modbus_server::fast::{self, EventSource, Packet, Waiting};
 use modbus_server::{
@@ -125,12 +125,17 @@ impl Block {
 }
 
 impl<const SLOTS: usize> Device<SLOTS> {
-    /// Creates a device with these settings, whose slots have channels of these kinds, in the order of the ports.
-    /// The outputs are set to START. `description` is that of the board.
+    /// Creates a device with these settings in `place`, because it is too large to be moved over the stack. The outputs
+    /// are set to START. `description` is that of the board.
     #[must_use]
     #[inline(never)]
-    pub fn new(config: Config<SLOTS>, identity: Identity, description: &'static Fixed) -> Self {
-        let mut device = Self {
+    pub fn new_in<'a>(
+        place: &'a mut MaybeUninit<Self>,
+        config: Config<SLOTS>,
+        identity: Identity,
+        description: &'static Fixed,
+    ) -> &'a mut Self {
+        let device = place.write(Self {
             points: Points::new(config.board().points().start, config.modules()),
             state: State::new(config.board(), identity),
             description: Description::new(description, &config),
@@ -144,7 +149,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
             activity: false,
             revision: config.revision(),
             config,
-        };
+        });
         device.configure_points();
         device.for_each_point(|port, channel, point| port.command_raw(channel, point.start));
         device

@@ -9,7 +9,7 @@ mod points;
 mod state;
 mod updating;
 
-use std::vec::Vec;
+use std::{boxed::Box, vec::Vec};
 
 use modbus_server::line::{Faults, Framing, Port, Receiver};
 use modbus_server::{Adu, Server, crc};
@@ -23,7 +23,7 @@ use crate::config::Settings;
 
 /// A device with these modules in its slots, these stored settings, and a server.
 struct Bench<const SLOTS: usize = 1> {
-    device: Device<SLOTS>,
+    device: &'static mut Device<SLOTS>,
     server: Server,
 }
 
@@ -51,7 +51,8 @@ impl<const SLOTS: usize> Bench<SLOTS> {
             build: 0,
         };
         Self {
-            device: Device::new(
+            device: Device::new_in(
+                Box::leak(Box::new_uninit()),
                 Config::new(board, settings, false),
                 identity,
                 if *board == MODIO_02 {
@@ -76,7 +77,7 @@ impl<const SLOTS: usize> Bench<SLOTS> {
         }
         assert!(port.long_silence(0));
         let request = port.take().expect("a request waits");
-        let reply = self.server.serve(request, &mut self.device);
+        let reply = self.server.serve(request, self.device);
         port.send(reply, 0);
         if let Some(order) = self.device.end_request() {
             self.device.carry_out(order, LineName::Rs485);
