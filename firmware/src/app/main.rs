@@ -233,10 +233,7 @@ mod app {
     fn radio(cx: radio::Context) {
         alive::begin(kept::marks(), Task::Radio);
         let mut shared = cx.shared;
-        let waits = cx
-            .local
-            .polling
-            .run(&mut shared.radio, &mut shared.device);
+        let waits = cx.local.polling.run(&mut shared.radio, &mut shared.device);
         if waits {
             rtic::pend(Interrupt::EXTI3);
         }
