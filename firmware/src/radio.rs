@@ -18,11 +18,12 @@ use modbus_server::{
 use modio_drivers::Lora;
 
 use crate::config::RadioConfig;
+use crate::line::Units;
 
 /// The radio line.
 pub struct RadioLine<S, M, A> {
     radio: Lora<S, M, A>,
-    port: Port<'static>,
+    port: Port<'static, Units>,
     /// Silence that ends a frame that is not complete, in milliseconds.
     frame_gap_ms: u16,
     /// Time since the last byte, in milliseconds, until it has reached the frame gap.
@@ -66,7 +67,7 @@ where
             module,
             frame_gap_ms,
         }: RadioConfig,
-        unit: u8,
+        units: Units,
         power_on: bool,
         adus: &'static mut [Adu],
     ) -> Self {
@@ -74,7 +75,7 @@ where
         let sending = if power_on { 0 } else { packet_ms };
         Self {
             radio: Lora::new(serial, mode, aux, module, sending),
-            port: Port::new(Receiver::rtu(unit, false), adus),
+            port: Port::new(Receiver::rtu(units, false), adus),
             frame_gap_ms,
             silence: Some(0),
             may_end_in_0: false,

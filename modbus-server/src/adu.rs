@@ -88,21 +88,24 @@ impl Adu {
     }
 
     /// Discards the first `count` bytes.
-    pub(crate) fn drop_front(&mut self, count: usize) {
-        let count = count.min(self.len);
-        self.bytes.copy_within(count..self.len, 0);
-        self.len -= count;
+    pub(crate) fn drop_front(&mut self, count: u8) {
+        for at in 0..=u8::MAX - count {
+            self.set(at, self.get(at + count));
+        }
+        self.cut(count.into());
     }
 
     /// Inserts `count` bytes at the front, with any content. Returns `false` and changes nothing when less than the two
     /// bytes of a CRC would be left free.
-    pub(crate) fn add_front(&mut self, count: usize) -> bool {
-        let (from, to) = (self.len, self.len + count);
-        if to + 2 > Self::CAPACITY {
+    pub(crate) fn add_front(&mut self, count: u8) -> bool {
+        let len = self.len + usize::from(count);
+        if len + 2 > Self::CAPACITY {
             return false;
         }
-        self.bytes.copy_within(..from, count);
-        self.len = to;
+        self.len = len;
+        for at in (0..=u8::MAX - count).rev() {
+            self.set(at + count, self.get(at));
+        }
         true
     }
 

@@ -16,8 +16,9 @@ const ADDRESS: u8 = 5;
 /// A device with events, each of which is a discrete input and its value.
 struct Device {
     points: Points,
-    events: Vec<(u16, u8)>,
+    events: Vec<(u16, u16)>,
     is_high: bool,
+    has_started: bool,
     set: Vec<(u8, u16, Setting)>,
 }
 
@@ -29,9 +30,13 @@ impl EventSource for Device {
         }
     }
 
+    fn reports_start(&self) -> bool {
+        self.has_started
+    }
+
     fn fill(&mut self, packet: &mut Packet) {
         while let Some((id, value)) = self.events.first() {
-            if !packet.push(Kind::DiscreteInput, *id, &[*value]) {
+            if !packet.push(Kind::DiscreteInput, *id, *value) {
                 break;
             }
             self.events.remove(0);
@@ -111,6 +116,7 @@ impl Unit {
                 points: Points::new(40, 130),
                 events: Vec::new(),
                 is_high: false,
+                has_started: true,
                 set: Vec::new(),
             },
         }
@@ -121,8 +127,7 @@ impl Unit {
         let mut waits = false;
         for byte in bytes {
             assert!(!waits, "a request ended too early");
-            self.port.received(*byte, Faults::NONE);
-            waits = self.port.ends_fast_message(|| 0);
+            waits = self.port.received(*byte, Faults::NONE) && self.port.ends_fast_message(0);
         }
         waits
     }
@@ -156,8 +161,10 @@ impl Unit {
             let Some(deadline) = self.port.deadline() else {
                 return Answer::Silence;
             };
-            let fell = (lost_in == Some(window)).then_some(deadline - 5);
-            match self.port.turn(fell) {
+            if lost_in == Some(window) {
+                self.port.fell(deadline - 5);
+            }
+            match self.port.turn() {
                 Turn::None => bits = bits << 1 | 1,
                 Turn::Bit(0xFF) => {
                     bits <<= 1;
@@ -306,10 +313,10 @@ fn settings_of_the_document_are_answered_with_masks() {
 #[test]
 fn a_packet_is_sent_again_unchanged_until_it_is_confirmed() {
     let mut unit = Unit::new(Part::Everything);
-    unit.unit.report_start(false);
+    unit.device.has_started = false;
     assert_eq!(unit.fetch(0, 0), (0b1111, bytes("FD 46 12")));
-    unit.device.events = vec![(0x01D0, 4)];
-    let first = bytes("05 46 11 00 01 05 01 02 01 D0 04");
+    unit.device.events = vec![(0x01D0, 1)];
+    let first = bytes("05 46 11 00 01 05 01 02 01 D0 01");
     assert_eq!(unit.fetch(0, 0), (0b1001, first.clone()));
     // A new event waits, and has high priority; the packet is the same.
     unit.device.events = vec![(1, 1)];
@@ -335,7 +342,7 @@ fn a_packet_is_sent_again_unchanged_until_it_is_confirmed() {
 #[test]
 fn a_packet_that_was_never_sent_cannot_be_confirmed() {
     let mut unit = Unit::new(Part::Everything);
-    unit.unit.report_start(false);
+    unit.device.has_started = false;
     unit.device.events = vec![(7, 1)];
     let fetch = bytes("FD 46 10 00 64 05 00");
     assert_eq!(unit.ask_losing_in(&fetch, Some(0)), Answer::Silence);
@@ -375,7 +382,7 @@ fn the_start_is_reported_in_every_packet_until_it_is_switched_off() {
         let packet = [5, 0x46, 0x11, flag, 1, 4, 0, 0x0F, 0, 0];
         assert_eq!(unit.fetch(5, flag ^ 1).1, packet);
     }
-    unit.unit.report_start(false);
+    unit.device.has_started = false;
     assert_eq!(unit.fetch(5, 0), (0b1111, bytes("FD 46 12")));
 }
 

@@ -8,15 +8,17 @@ use board_support::{
 };
 use cortex_m::peripheral::SCB;
 use firmware::{
+    HAS_EVENTS,
     config::{self, Config, LineConfig, RadioConfig},
     device::Identity,
     leds::{Leds, Trouble},
+    line,
     start_up::{self, Address, RECOVERY_UNIT},
     store::{Store, WriteError},
 };
 use modbus_server::{
-    Adu,
-    line::{Framing, Gaps, Port, Receiver, Width},
+    Adu, fast,
+    line::{Framing, Gaps, Port, Receiver, Width, Windows},
 };
 use modio_drivers::DacLink;
 use register_map::{
@@ -102,7 +104,11 @@ pub fn up(
 
     let mut sampler = board.sampler;
     let (modules, analog_outputs) = install(installed, &mut sampler, board.dacs);
+    let serial_number = start_up::serial_number(board.unique_id, config.serial_low());
+    let is_rtu = settings.mode == Mode::Rtu && HAS_EVENTS;
     let identity = Identity {
+        serial_number,
+        reports_events: is_rtu && matches!(address, Address::Unit(_)),
         unit: address.unit().unwrap_or_default(),
         reset_cause: board.reset_cause,
         unique_id: board.unique_id,
@@ -147,17 +153,17 @@ pub fn up(
     let t35 = settings
         .frame_gap
         .map_or(gaps.t35, |tenths| gaps.frame_gap(tenths));
-    let line = address.unit().and_then(|unit| {
+    let line = line::units(address.unit(), is_rtu).and_then(|units| {
         let strict = settings.gap_rule == GapRule::Drop;
         let (receiver, (t15_ns, t35_ns)) = match framing {
-            Framing::Rtu => (Receiver::rtu(unit, strict), (gaps.t15.min(t35), t35)),
+            Framing::Rtu => (Receiver::rtu(units, strict), (gaps.t15.min(t35), t35)),
             Framing::Ascii { .. } => {
                 let width = match settings.format.data_bits() {
                     7 if on_wire.format.stop_in_data() != 0 => Width::SevenAndStop,
                     7 => Width::Seven,
                     _ => Width::Eight,
                 };
-                (Receiver::ascii(unit, width), (t35, Gaps::ASCII_TIMEOUT))
+                (Receiver::ascii(units, width), (t35, Gaps::ASCII_TIMEOUT))
             }
         };
         let limit_us = longest_reply_us(on_wire, framing);
@@ -170,22 +176,22 @@ pub fn up(
         // The count may begin just before a tick.
         let longest_ms = (limit_us / 1000) as u16 + 2;
         let port = Port::new(receiver, adus);
-        Some(Line::new(uart, gap, port, longest_ms))
+        let (bit, us) = gap.bit_and_us();
+        Some(Line::new(
+            uart,
+            gap,
+            port,
+            Windows::new(bit, us),
+            longest_ms,
+        ))
     });
 
     let (radio, radio_uart) = radio_config
         .and_then(|config| {
+            let units = line::units(address.unit(), false)?;
             let (uart, mode, aux) = board.radio.start(&mut board.rcc)?;
             let power_on = u16::from(board.reset_cause) & POWER_ON != 0;
-            let radio = Radio::new(
-                Serial,
-                mode,
-                aux,
-                config,
-                identity.unit,
-                power_on,
-                radio_adus,
-            );
+            let radio = Radio::new(Serial, mode, aux, config, units, power_on, radio_adus);
             Some((radio, uart))
         })
         .unzip();
@@ -196,6 +202,11 @@ pub fn up(
         radio_uart,
         serving: Serving::new(
             identity.unit,
+            fast::Unit::new(
+                serial_number,
+                identity.unit,
+                start_up::part(address, board.clock.is_crystal()),
+            ),
             (framing, t35.div_ceil(1_000_000)),
             points_only,
         ),

@@ -18,6 +18,7 @@
 mod comm_watchdog;
 mod description;
 mod edge_log;
+mod events;
 mod identification;
 mod points;
 mod port;
@@ -28,8 +29,9 @@ mod tests;
 
 use core::{mem::MaybeUninit, ops::Range};
 
+use modbus_server::fast::{self, EventSource, Packet, Waiting};
 use modbus_server::{
-    Bits, BitsOut, DataModel, Exception, Server, Span, Table, TextOut, Words, WordsOut,
+    Adu, Bits, BitsOut, DataModel, Exception, Server, Span, Table, TextOut, Words, WordsOut,
 };
 use modio_drivers::{CHANNELS, Channels};
 use register_map::configuration::COMMAND;
@@ -40,10 +42,12 @@ pub use comm_watchdog::CommWatchdog;
 use description::Description;
 pub use description::Fixed;
 use edge_log::EdgeLog;
+use events::Events;
 pub use points::Points;
 pub use port::IoPort;
 pub use state::{Identity, State};
 
+use crate::HAS_EVENTS;
 use crate::config::{Config, LineName, Origin, Point};
 use crate::update::{Order, TRIAL_S, Update};
 
@@ -59,6 +63,7 @@ pub struct Device<const SLOTS: usize> {
     description: Description,
     comm_watchdog: CommWatchdog,
     edges: EdgeLog,
+    events: Events<SLOTS>,
     /// A command from a request, to be executed when its reply has been sent.
     ordered: Option<Command>,
     /// The device is to restart once no save is under way.
@@ -137,6 +142,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
             description: Description::new(description, &config),
             comm_watchdog: CommWatchdog::new(),
             edges: EdgeLog::new(),
+            events: Events::new(),
             ordered: None,
             restart: None,
             update: None,
@@ -200,14 +206,20 @@ impl<const SLOTS: usize> Device<SLOTS> {
             return;
         };
         let edges = port.scanned(channels, words, now);
+        if HAS_EVENTS {
+            self.events.look(slot, port, now);
+        }
         if edges == 0 {
             return;
         }
         for (channel, settings) in port.settings().iter().enumerate() {
             if edges >> channel & 1 != 0 {
                 let point = first.wrapping_add(channel as u16);
-                self.edges
-                    .add(point, channels.bit(channel), now, settings.filter);
+                let level = channels.bit(channel);
+                self.edges.add(point, level, now, settings.filter);
+                if HAS_EVENTS {
+                    self.events.edge(slot, channel, level);
+                }
             }
         }
     }
@@ -501,6 +513,25 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
         self.status()
     }
 
+    /// Function 70 with the unit's own address: which points report events.
+    fn check_custom(&self, code: u8, data: &[u8]) -> Result<(), Exception> {
+        let is_served = HAS_EVENTS
+            && code == fast::FUNCTION
+            && self.state.reports_events()
+            && self.config.origin_line() == LineName::Rs485;
+        if !is_served {
+            return Err(Exception::IllegalFunction);
+        }
+        fast::check_settings(data)
+    }
+
+    fn serve_custom(&mut self, _: u8, adu: &mut Adu) {
+        let (ports, first) = (self.points.ports(), self.points.first_of(0));
+        fast::apply_settings(adu, |kind, id, to| {
+            self.events.set(ports, first, kind, id, to)
+        });
+    }
+
     fn server_id(&self) -> &[u8] {
         self.state.server_id()
     }
@@ -514,5 +545,20 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
         let value = identification::object(object, self.state.serial(), &self.config);
         text.extend(value.unwrap_or_default());
         value.is_some()
+    }
+}
+
+impl<const SLOTS: usize> EventSource for Device<SLOTS> {
+    fn waiting(&self) -> Waiting {
+        self.events.waiting()
+    }
+
+    fn reports_start(&self) -> bool {
+        self.events.reports_start()
+    }
+
+    fn fill(&mut self, packet: &mut Packet) {
+        let first = self.points.first_of(0);
+        self.events.fill(packet, self.points.ports(), first);
     }
 }

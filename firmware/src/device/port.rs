@@ -2,6 +2,7 @@
 
 use modio_drivers::{CHANNELS, ChannelSettings, ChannelStatus, Channels, Code, Kind, scale};
 use register_map::codes::ModuleState;
+use register_map::limits;
 
 use crate::config::Point;
 
@@ -124,6 +125,23 @@ impl IoPort {
             }
             _ => {}
         }
+    }
+
+    /// Returns the value of a channel: 0 or 1 for a bit.
+    pub(super) fn value(&self, channel: usize) -> u16 {
+        match self.kind(channel) {
+            Kind::WordInput | Kind::WordOutput => self.channels.word(channel),
+            Kind::None | Kind::BitInput | Kind::BitOutput => self.channels.bit(channel).into(),
+        }
+    }
+
+    /// Returns the smallest change of a word that is an event: 1/256 of its range.
+    pub(super) fn deadband(&self, channel: usize) -> u16 {
+        let range = self.setting(channel).map(|setting| {
+            let (min, max) = limits::of_input(setting.signal, setting.scale);
+            max.abs_diff(min)
+        });
+        range.unwrap_or_default() / 256
     }
 
     /// Sets the outputs to SAFE.

@@ -14,7 +14,7 @@ pub enum Kind {
     HoldingRegister = 3,
     /// An input register has changed. The data is its value, low byte first.
     InputRegister = 4,
-    /// The unit itself: id 0, it has started; other ids are the device's own.
+    /// The unit itself, without a value: id 0, it has started; other ids are the device's own.
     Unit = 0x0F,
 }
 
@@ -36,6 +36,10 @@ pub struct Waiting {
 pub trait EventSource {
     /// Returns what waits.
     fn waiting(&self) -> Waiting;
+
+    /// Returns whether the event "the unit has started" heads every packet: from the start until a master switches it off
+    /// (sub-function 18, kind [`Kind::Unit`], id [`Kind::STARTED`]).
+    fn reports_start(&self) -> bool;
 
     /// Moves the oldest events into `packet`, until there is no more [room](Packet::push). They are reported from then
     /// on; the packet keeps them until the master has them.
@@ -86,25 +90,26 @@ impl Packet {
         self.was_sent = false;
     }
 
-    /// Adds an event with its data, low byte first. Returns `false` and changes nothing when there is no room.
-    pub fn push(&mut self, kind: Kind, id: u16, data: &[u8]) -> bool {
-        let [high, low] = id.to_be_bytes();
-        let head = [data.len() as u8, kind as u8, high, low];
+    /// Adds an event with its value. Returns `false` and changes nothing when there is no room.
+    pub fn push(&mut self, kind: Kind, id: u16, value: u16) -> bool {
+        let ([high, low], [first, second]) = (id.to_be_bytes(), value.to_le_bytes());
+        let len = match kind {
+            Kind::Unit => 0,
+            Kind::Coil | Kind::DiscreteInput => 1,
+            Kind::HoldingRegister | Kind::InputRegister => 2,
+        };
+        let event = [len, kind as u8, high, low, first, second];
         let start = usize::from(self.len);
-        let end = start + head.len() + data.len();
-        if end > self.room.into() {
+        let end = self.len + 4 + len;
+        if end > self.room {
             return false;
         }
-        if let Some(place) = self.bytes.get_mut(start..end) {
-            let bytes = head.iter().chain(data);
-            place
-                .iter_mut()
-                .zip(bytes)
-                .for_each(|(to, from)| *to = *from);
-            // At most `CAPACITY`.
-            self.len = end as u8;
-            self.number = self.number.saturating_add(1);
+        let places = self.bytes.iter_mut().skip(start);
+        for (place, byte) in places.zip(event) {
+            *place = byte;
         }
+        self.len = end;
+        self.number = self.number.saturating_add(1);
         true
     }
 

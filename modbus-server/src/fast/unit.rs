@@ -39,8 +39,6 @@ pub struct Unit {
     address: u8,
     part: Part,
     is_found: bool,
-    /// The event "the unit has started" is reported.
-    reports_start: bool,
     /// Number of packets that were sent in a row.
     in_a_row: u8,
     packet: Packet,
@@ -74,16 +72,10 @@ impl Unit {
             address,
             part,
             is_found: false,
-            reports_start: true,
             in_a_row: 0,
             packet: Packet::new(),
             contended: Contended::Nothing,
         }
-    }
-
-    /// Switches the report of the unit's start on or off: sub-function 18 for kind 15, id 0.
-    pub const fn report_start(&mut self, on: bool) {
-        self.reports_start = on;
     }
 
     /// Notes whether the unit has won its last arbitration.
@@ -128,7 +120,7 @@ impl Unit {
             return None;
         }
         let waiting = source.waiting();
-        let has_events = waiting.count > 0 || self.reports_start || !self.packet.is_empty();
+        let has_events = waiting.count > 0 || source.reports_start() || !self.packet.is_empty();
         adu.truncate(2);
         if !has_events {
             adu.extend(&[sub::NO_EVENTS]);
@@ -139,8 +131,8 @@ impl Unit {
         if self.packet.is_empty() {
             self.packet.clear(room);
             self.packet.is_high = waiting.is_high;
-            if self.reports_start {
-                self.packet.push(Kind::Unit, Kind::STARTED, &[]);
+            if source.reports_start() {
+                self.packet.push(Kind::Unit, Kind::STARTED, 0);
             }
             source.fill(&mut self.packet);
             self.packet.number = self.packet.number.saturating_add(source.waiting().count);
@@ -185,30 +177,40 @@ impl Server {
         unit.end_contest(request.won);
         let adu = &mut *request.adu;
         let arbitrates = unit.part != Part::Requests;
+        let mut outcome = Outcome::NoEffect;
+        let is_fast = adu.get(1) == FUNCTION;
         let contest = match (adu.get(2), adu.len()) {
-            _ if adu.get(1) != FUNCTION || self.is_listen_only() => None,
-            (sub::REQUEST, 8..) if adu.from(3).starts_with(&unit.serial.to_be_bytes()) => {
-                if unit.part != Part::Scans {
-                    return (
-                        self.serve_by_serial(request, unit, model),
-                        Contest::default(),
-                    );
-                }
+            _ if self.is_listen_only() => {
+                outcome = Outcome::NotObeyed;
                 None
             }
-            (sub::START_SCAN, 3) if arbitrates => {
-                unit.is_found = false;
-                Some(unit.scan(adu))
+            (sub::REQUEST, 8..)
+                if adu.from(3).starts_with(&unit.serial.to_be_bytes())
+                    && is_fast
+                    && unit.part != Part::Scans =>
+            {
+                let reply = self.serve_by_serial(request, unit, model);
+                return (reply, Contest::default());
             }
-            (sub::CONTINUE_SCAN, 3) if arbitrates => Some(unit.scan(adu)),
-            (sub::FETCH, 7) if unit.part == Part::Everything => unit.fetch(adu, model),
-            _ => None,
+            (sub::START_SCAN, 3) if is_fast => {
+                unit.is_found = false;
+                arbitrates.then(|| unit.scan(adu))
+            }
+            (sub::CONTINUE_SCAN, 3) if is_fast => arbitrates.then(|| unit.scan(adu)),
+            (sub::FETCH, 7) if is_fast => {
+                let takes_part = unit.part == Part::Everything;
+                takes_part.then(|| unit.fetch(adu, model)).flatten()
+            }
+            _ => {
+                outcome = Outcome::NoRequest;
+                None
+            }
         };
         let reply = Reply {
             adu: request.adu,
             is_answered: contest.is_some(),
             framing: self.framing(),
-            outcome: Outcome::NoEffect,
+            outcome,
             writes: false,
         };
         (reply, contest.unwrap_or_default())
@@ -222,7 +224,7 @@ impl Server {
         model: &mut impl DataModel,
     ) -> Reply<'a> {
         let adu = &mut *request.adu;
-        adu.drop_front(SERIAL_AHEAD.into());
+        adu.drop_front(SERIAL_AHEAD);
         // Not the address of a broadcast, also for a unit without an address.
         adu.set(0, ADDRESS);
         let refusal = match adu.get(1) {
@@ -242,10 +244,10 @@ impl Server {
         };
         if reply.is_answered {
             let adu = &mut *reply.adu;
-            if !adu.add_front(SERIAL_AHEAD.into()) {
+            if !adu.add_front(SERIAL_AHEAD) {
                 // It read something, because 17 was refused and all other replies are no longer than their requests.
                 reply.outcome = refuse(adu, Exception::IllegalDataValue.into());
-                adu.add_front(SERIAL_AHEAD.into());
+                adu.add_front(SERIAL_AHEAD);
             }
             let head = [ADDRESS, FUNCTION, sub::REPLY].into_iter();
             for (at, byte) in (0..).zip(head.chain(unit.serial.to_be_bytes())) {

@@ -31,36 +31,20 @@ pub struct Windows {
 }
 
 impl Windows {
-    /// Returns the times at `baud` bit/s with ticks of `cycles` cycles of a clock of `mhz` MHz: start max(38.5 bits, 12
-    /// bits + 800 us), length max(13 bits, 12 bits + 50 us rounded up to whole bits), guard max(24 us, a quarter of a
-    /// bit). A character counts as 11 bits, whatever its format.
+    /// Returns the times for a bit and a microsecond of these lengths: start max(38.5 bits, 12 bits + 800 us), length
+    /// max(13 bits, 12 bits + 50 us rounded up to whole bits), guard max(24 us, a quarter of a bit). A character counts as
+    /// 11 bits, whatever its format.
     ///
-    /// `baud` x `cycles` must be below 2^24.
+    /// `bit` must not be 0.
     #[must_use]
-    pub const fn new(baud: u32, mhz: u8, cycles: u32) -> Self {
-        let mhz = mhz as u32;
-        let bit = ratio(mhz * 1_000_000, baud * cycles);
-        let length = 12 + (50 * (baud / 100)).div_ceil(10_000);
+    pub fn new(bit: u32, us: u32) -> Self {
+        let length = 12 + (50 * us).div_ceil(bit.max(1));
         Self {
-            start: max(38 * bit + bit / 2, 12 * bit + ratio(800 * mhz, cycles)),
-            length: max(13, length) * bit,
-            guard: max(ratio(24 * mhz, cycles), bit / 4),
+            start: (38 * bit + bit / 2).max(12 * bit + 800 * us),
+            length: length.max(13) * bit,
+            guard: (24 * us).max(bit / 4),
         }
     }
-}
-
-/// Returns `n / d` in fractions, rounded down: the upper 16 bits before the point, the lower ones after it. `d` must be
-/// below 2^24. A division of 64-bit numbers would cost 400 bytes of code on a Cortex-M3.
-const fn ratio(n: u32, d: u32) -> u32 {
-    let d = max(d, 1);
-    let whole = n / d;
-    let rest = (n % d) << 8;
-    let more = (rest % d) << 8;
-    (whole << 16) | (rest / d) << 8 | more / d
-}
-
-const fn max(one: u32, other: u32) -> u32 {
-    if one > other { one } else { other }
 }
 
 /// What a unit does at the [deadline](Arbitration::deadline) of its arbitration.

@@ -38,15 +38,12 @@ impl Message {
     }
 }
 
-/// Returns the last three bytes, if they are the first ones of a reply.
-pub(super) fn begins_reply(frame: &Adu) -> Option<[u8; 3]> {
-    let &[.., unit, FUNCTION, sub] = frame.as_slice() else {
-        return None;
-    };
-    let of_one = sub == sub::EVENTS;
+/// Returns whether a reply begins with these bytes.
+#[inline]
+pub(super) fn begins_reply(unit: u8, function: u8, sub: u8) -> bool {
     let of_all = matches!(
         sub,
         sub::FOUND | sub::NONE_LEFT | sub::REPLY | sub::NO_EVENTS
     );
-    (of_one || of_all && unit == ADDRESS).then_some([unit, FUNCTION, sub])
+    function == FUNCTION && (sub == sub::EVENTS || of_all && unit == ADDRESS)
 }

@@ -81,23 +81,17 @@ impl<'a, U: Units> Port<'a, U> {
         }
     }
 
-    /// Processes a received character and its faults.
+    /// Processes a received character and its faults. Returns whether [`ends_fast_message`](Self::ends_fast_message)
+    /// must be called: only on a line with a [`FastUnit`](super::FastUnit).
     #[inline(always)]
-    pub fn received(&mut self, byte: u8, faults: Faults) {
-        self.receiver.character(byte, faults);
+    pub fn received(&mut self, byte: u8, faults: Faults) -> bool {
+        self.receiver.character(byte, faults)
     }
 
     /// Ends the frame if it is a whole message of [Fast Modbus](crate::fast), in tick `now`, which ends without a silence.
-    /// Returns whether a request waits to be served. To be called after each character, if units of this line serve Fast
-    /// Modbus ([`FastUnit`](super::FastUnit)).
-    #[inline(always)]
-    pub fn ends_fast_message(&mut self, now: impl FnOnce() -> u32) -> bool {
-        self.receiver.is_fast_message() && self.end_fast_message(now())
-    }
-
-    #[inline(never)]
-    fn end_fast_message(&mut self, now: u32) -> bool {
-        self.close(now)
+    /// Returns whether a request waits to be served.
+    pub fn ends_fast_message(&mut self, now: u32) -> bool {
+        self.receiver.is_fast_message() && self.close(now)
     }
 
     /// Returns whether the RTU frame so far has a valid CRC and the length that its function requires: of a request,
@@ -203,8 +197,8 @@ impl<'a, U: Units> Port<'a, U> {
         self.reply = State::Waiting(if delay == 0 { 0 } else { 1 + u32::from(delay) });
     }
 
-    /// Takes a reply that is sent if its arbitration is won. Call [`turn`](Self::turn) at each
-    /// [`deadline`](Self::deadline). A frame that has come since the request ends the arbitration.
+    /// Takes a reply that is sent if its arbitration is won. Call [`fell`](Self::fell) when the line falls, at the latest in
+    /// front of the next turn, and [`turn`](Self::turn) at each [`deadline`](Self::deadline). A frame that has come since the request ends the arbitration.
     pub fn arbitrate(&mut self, reply: Reply<'a>, arbitration: Arbitration) {
         let is_late = self.request.is_some() || !self.receiver.is_idle();
         if !reply.is_answered || is_late || self.reply == State::Sending {
@@ -221,15 +215,18 @@ impl<'a, U: Units> Port<'a, U> {
             .map(|(_, arbitration)| arbitration.deadline())
     }
 
-    /// Takes the unit's turn in its arbitration. `fell`: the last time at which the line fell, if it has fallen since the
-    /// last turn.
-    pub fn turn(&mut self, fell: Option<u32>) -> Turn {
+    /// Notes the last time at which the line fell, while the unit arbitrates.
+    pub const fn fell(&mut self, at: u32) {
+        if let Some((_, arbitration)) = &mut self.contender {
+            arbitration.fell(at);
+        }
+    }
+
+    /// Takes the unit's turn in its arbitration.
+    pub fn turn(&mut self) -> Turn {
         let Some((_, arbitration)) = &mut self.contender else {
             return Turn::None;
         };
-        if let Some(at) = fell {
-            arbitration.fell(at);
-        }
         match arbitration.step() {
             Step::Wait => Turn::None,
             Step::Send => Turn::Bit(Arbitration::ZERO),

@@ -114,19 +114,23 @@ impl<'a, U: Units> Receiver<'a, U> {
         count(&mut self.counters.unsent);
     }
 
-    /// Processes a received character.
+    /// Processes a received character. Returns whether it may be the last of a message of Fast Modbus, or one of an
+    /// arbitration.
     #[inline(always)]
-    pub fn character(&mut self, byte: u8, faults: Faults) {
+    pub fn character(&mut self, byte: u8, faults: Faults) -> bool {
         let special = self.state | u16::from(faults.bits());
         if special != 0 {
             if special != IDLE {
-                return self.special(byte, faults);
+                self.special(byte, faults);
+                return U::FAST;
             }
             // The first character of an RTU frame needs no other treatment, because everything is prepared for it.
             self.state = 0;
         }
-        self.check = crc::step(self.check, byte);
+        let check = crc::step(self.check, byte);
+        self.check = check;
         self.keep(byte);
+        U::FAST && check == crc::GOOD
     }
 
     /// Notes that 1.5 characters of silence have passed, in RTU mode. Has no effect in ASCII mode.
@@ -163,15 +167,9 @@ impl<'a, U: Units> Receiver<'a, U> {
 
     /// Returns whether the RTU frame so far is a whole message of Fast Modbus between a master and all units: it has a
     /// valid CRC and the length that its sub-function requires. It ends without a silence: [`close`](Self::close) it.
-    #[inline(always)]
     pub fn is_fast_message(&self) -> bool {
-        // This is after each character, so the CRC comes first.
-        U::FAST && self.check == crc::GOOD && self.ends_fast_message()
-    }
-
-    #[inline(never)]
-    fn ends_fast_message(&self) -> bool {
-        self.state & !(FOLLOWS | QUIET) == 0
+        self.check == crc::GOOD
+            && self.state & !(FOLLOWS | QUIET) == 0
             && (self.filling.as_ref()).is_some_and(|adu| Message::of(adu).is_some())
     }
 
@@ -258,16 +256,24 @@ impl<'a, U: Units> Receiver<'a, U> {
     /// Drops what is in front of the reply of Fast Modbus that the last three characters begin, if they do. While units
     /// arbitrate, several start bits can overlap, so that these characters need not be FF.
     fn seek_reply(&mut self) {
-        if let Some(adu) = &mut self.filling
-            && let Some(head) = begins_reply(adu)
-        {
+        let Some(adu) = &mut self.filling else {
+            return;
+        };
+        let Some(at) = adu.len().checked_sub(3) else {
+            return;
+        };
+        // Below 256.
+        let at = at as u8;
+        if begins_reply(adu.get(at), adu.get(at + 1), adu.get(at + 2)) {
             adu.clear();
             self.check = crc::START;
-            for byte in head {
+            self.state = FOLLOWS;
+            // No byte is overwritten before it is read.
+            for n in 0..3 {
+                let byte = adu.get(at + n);
                 self.check = crc::step(self.check, byte);
                 adu.push(byte);
             }
-            self.state &= FOLLOWS;
         }
     }
 
@@ -300,7 +306,7 @@ impl<'a, U: Units> Receiver<'a, U> {
             return None;
         }
         count(&mut self.counters.bus_messages);
-        if U::FAST && state & ASCII == 0 && self.is_fast_reply() || !self.takes(address) {
+        if self.units.is_fast() && self.is_fast_reply() || !self.takes(address) {
             return None;
         }
         if state & (TORN | UNKEPT) != 0 {

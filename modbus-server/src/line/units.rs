@@ -3,12 +3,17 @@
 /// The unit addresses whose requests a [`Receiver`](super::Receiver) takes: a `u8` for a single one, a [`UnitSet`], or a
 /// [`FastUnit`].
 pub trait Units {
-    /// The line recognises messages of Fast Modbus ([`fast`](crate::fast)) at their last byte. Costs nothing when
+    /// Lines can recognise messages of Fast Modbus ([`fast`](crate::fast)) at their last byte. Costs nothing when
     /// `false`.
     const FAST: bool = false;
 
     /// Returns whether requests to this unit address are taken.
     fn contains(&self, unit: u8) -> bool;
+
+    /// Returns whether messages of Fast Modbus are recognised on this line.
+    fn is_fast(&self) -> bool {
+        Self::FAST
+    }
 
     /// Returns whether broadcasts are taken.
     fn takes_broadcasts(&self) -> bool {
@@ -29,7 +34,8 @@ pub struct FastUnit {
     /// `None` for a unit without an address. It takes requests to [`fast::ADDRESS`](crate::fast::ADDRESS) only, so that
     /// it can be found.
     pub unit: Option<u8>,
-    /// Whether requests to [`fast::ADDRESS`](crate::fast::ADDRESS) are taken. Not on an ASCII line.
+    /// Whether messages of Fast Modbus are recognised, and requests to [`fast::ADDRESS`](crate::fast::ADDRESS) taken. Not
+    /// on an ASCII line.
     pub is_fast: bool,
 }
 
@@ -39,6 +45,11 @@ impl Units for FastUnit {
     #[inline(always)]
     fn contains(&self, unit: u8) -> bool {
         self.unit == Some(unit) || self.is_fast && unit == crate::fast::ADDRESS
+    }
+
+    #[inline(always)]
+    fn is_fast(&self) -> bool {
+        self.is_fast
     }
 
     #[inline(always)]

@@ -46,6 +46,8 @@ impl<const SLOTS: usize> Bench<SLOTS> {
             unique_id: [1, 2, 3, 4, 5, 6],
             fault: [3; 16],
             internal_oscillator: false,
+            serial_number: 0x0D00_1234,
+            reports_events: true,
             build: 0,
         };
         Self {

@@ -1,7 +1,7 @@
 //! The release image of the modio-08 on the virtual board. The image comes from `MODIO_ELF_08`, which `cargo xtask
 //! test` sets after building it.
 //!
-//! The tests of the four slots are in `slots`, `analog`, `digital` and `faults_of_slots`. The other files are those of
+//! The tests of the four slots are in `slots`, `analog`, `digital` and `faults_of_slots`, those of function 70 in `fast`. The other files are those of
 //! the modio-02's tests whose result depends on the board, with one module in the first slot: start, store, timing,
 //! stack, the pins of the radio, and an update.
 
@@ -21,6 +21,7 @@ const FILES: [&str; 4] = [
 
 mod analog;
 mod digital;
+mod fast;
 mod faults_of_slots;
 mod fitted;
 mod slots;
