@@ -422,15 +422,13 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
         match Block::of(span) {
             Block::Points => self.points.read_words(span, out),
             Block::Config => self.config.read(span, out),
-            Block::State | Block::Radio => span
-                .addresses()
-                .for_each(|address| out.push(self.state_word(address))),
-            Block::Fault => span
-                .addresses()
-                .for_each(|address| out.push(self.state.fault_word(address))),
-            Block::Pulses | Block::Edges => span
-                .addresses()
-                .for_each(|address| out.push(self.points.input_word(address))),
+            block => span.addresses().for_each(|address| {
+                out.push(match block {
+                    Block::Fault => self.state.fault_word(address),
+                    Block::Pulses | Block::Edges => self.points.input_word(address),
+                    _ => self.state_word(address),
+                });
+            }),
         }
     }
 
