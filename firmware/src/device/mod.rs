@@ -333,6 +333,8 @@ impl<const SLOTS: usize> Device<SLOTS> {
             )
     }
 
+    // Not inlined into the loop over the registers, which has few registers of the core left.
+    #[inline(never)]
     fn state_word(&self, address: u16) -> u16 {
         match address {
             state_map::STATUS => self.status(),
