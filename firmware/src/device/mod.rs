@@ -195,6 +195,8 @@ impl<const SLOTS: usize> Device<SLOTS> {
     /// Stores the inputs that a scan of a slot has read. `words` is false when the settings have changed since the scan
     /// began: then the words of the scan have the wrong unit. `late`: the scan before this one was some milliseconds ago,
     /// because flash was erased.
+    // Not inlined into the scan, whose frame is large.
+    #[inline(never)]
     pub fn scanned(&mut self, slot: usize, channels: &Channels, words: bool, late: bool) {
         // 0 stands for an input without an edge.
         let now = self.state.millis().max(1);
