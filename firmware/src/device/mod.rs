@@ -195,6 +195,8 @@ impl<const SLOTS: usize> Device<SLOTS> {
     /// Stores the inputs that a scan of a slot has read. `words` is false when the settings have changed since the scan
     /// began: then the words of the scan have the wrong unit. `late`: the scan before this one was some milliseconds ago,
     /// because flash was erased.
+    // Not inlined into the scan, whose frame is large.
+    #[inline(never)]
     pub fn scanned(&mut self, slot: usize, channels: &Channels, words: bool, late: bool) {
         // 0 stands for an input without an edge.
         let now = self.state.millis().max(1);
@@ -333,6 +335,8 @@ impl<const SLOTS: usize> Device<SLOTS> {
             )
     }
 
+    // Not inlined into the loop over the registers, which has few registers of the core left.
+    #[inline(never)]
     fn state_word(&self, address: u16) -> u16 {
         match address {
             state_map::STATUS => self.status(),
@@ -422,15 +426,13 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
         match Block::of(span) {
             Block::Points => self.points.read_words(span, out),
             Block::Config => self.config.read(span, out),
-            Block::State | Block::Radio => span
-                .addresses()
-                .for_each(|address| out.push(self.state_word(address))),
-            Block::Fault => span
-                .addresses()
-                .for_each(|address| out.push(self.state.fault_word(address))),
-            Block::Pulses | Block::Edges => span
-                .addresses()
-                .for_each(|address| out.push(self.points.input_word(address))),
+            block => span.addresses().for_each(|address| {
+                out.push(match block {
+                    Block::Fault => self.state.fault_word(address),
+                    Block::Pulses | Block::Edges => self.points.input_word(address),
+                    _ => self.state_word(address),
+                });
+            }),
         }
     }
 
