@@ -36,6 +36,7 @@ mod kind;
 pub mod layout;
 pub mod limits;
 mod module;
+pub mod name;
 pub mod part;
 pub mod points;
 mod port;
@@ -58,8 +59,9 @@ pub use value::{Unit, Value};
 pub use values::Values;
 
 /// Every block, in ascending order of the addresses.
-pub static BLOCKS: [&Block; 7] = [
+pub static BLOCKS: [&Block; 8] = [
     &points::BLOCK,
+    &name::BLOCK,
     &configuration::BLOCK,
     &state::BLOCK,
     &fault::BLOCK,

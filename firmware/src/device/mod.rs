@@ -36,7 +36,7 @@ use modbus_server::{
 use modio_drivers::{CHANNELS, Channels};
 use register_map::configuration::COMMAND;
 use register_map::update::status;
-use register_map::{codes::Command, counters, edges, fault, radio, state as state_map};
+use register_map::{codes::Command, counters, edges, fault, name, radio, state as state_map};
 
 pub use comm_watchdog::CommWatchdog;
 use description::Description;
@@ -92,6 +92,7 @@ pub enum Restart {
 /// The block of the address space that contains the start of a span. The span must not leave the block.
 enum Block {
     Points,
+    Name,
     Config,
     State,
     Fault,
@@ -104,7 +105,7 @@ impl Block {
     #[inline(always)]
     const fn of(span: Span) -> Self {
         // Most requests are for points.
-        if span.start() < 0x0100 {
+        if span.start() < register_map::points::COUNT {
             Self::Points
         } else {
             Self::of_others(span)
@@ -114,6 +115,7 @@ impl Block {
     #[inline(never)]
     const fn of_others(span: Span) -> Self {
         match span.start().to_be_bytes() {
+            [0, _] => Self::Name,
             [1, _] => Self::Config,
             [2, 0x00..=0x5F] => Self::State,
             [2, 0x60..=0x6F] => Self::Fault,
@@ -319,6 +321,13 @@ impl<const SLOTS: usize> Device<SLOTS> {
         }
     }
 
+    /// Returns a register of the board's name.
+    fn name_word(&self, address: u16) -> u16 {
+        let index = usize::from(address.wrapping_sub(name::NAME));
+        let byte = self.config.board().name.as_bytes().get(index);
+        byte.copied().unwrap_or_default().into()
+    }
+
     /// Returns the status register (0x020A).
     fn status(&self) -> u16 {
         use state_map::status;
@@ -373,6 +382,7 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
         match Block::of(span) {
             Block::Points => self.points.check_read_words(span),
             Block::Config => self.config.check_read(span),
+            Block::Name => check_exists(name::SPANS, span),
             Block::State => check_exists(state_map::SPANS, span),
             Block::Fault => check_exists(fault::SPANS, span),
             Block::Radio => check_exists(radio::SPANS, span),
@@ -396,7 +406,7 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
                 }
                 checked
             }
-            Block::State | Block::Fault | Block::Radio | Block::Edges => {
+            Block::Name | Block::State | Block::Fault | Block::Radio | Block::Edges => {
                 Err(Exception::IllegalDataAddress)
             }
             Block::Pulses => {
@@ -428,6 +438,7 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
             Block::Config => self.config.read(span, out),
             block => span.addresses().for_each(|address| {
                 out.push(match block {
+                    Block::Name => self.name_word(address),
                     Block::Fault => self.state.fault_word(address),
                     Block::Pulses | Block::Edges => self.points.input_word(address),
                     _ => self.state_word(address),
@@ -448,7 +459,7 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
             }
             Block::Pulses => self.points.clear_pulses(span),
             // `check_write_words` rejects writes to these blocks.
-            Block::State | Block::Fault | Block::Radio | Block::Edges => {}
+            Block::Name | Block::State | Block::Fault | Block::Radio | Block::Edges => {}
         }
     }
 
