@@ -111,9 +111,9 @@ Each address has 25 ms to answer. Silent addresses are asked once more, with 150
 what was found. With --timeout there is a single pass that waits so long: for a RESPONSE_DELAY above 100 ms, or over the \
 air.
 
---fast takes less than 0.2 s for each unit at 9600 bit/s, and also finds units with the same address. It finds units with \
-Fast Modbus (function 70) in RTU: a modio with its crystal running, and units of other makers that have it. With units of \
-another maker on the line it is not promised that the arbitration always finds one winner: compare with a usual scan.")]
+--fast takes about 0.2 s for each unit at 9600 bit/s, and also finds units with the same address. It finds units with \
+Fast Modbus (function 70) in RTU, such as a modio-08 whose crystal runs, also those of other makers. While units of \
+several makers are on the line, a unit may be missing: their arbitration can differ.")]
 pub struct Scan {
     /// Let units report themselves with their serial numbers, instead of asking every address
     #[arg(long, conflicts_with = "units")]

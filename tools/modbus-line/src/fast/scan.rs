@@ -7,7 +7,7 @@ use super::{Reply, Request};
 /// Number of times that a request is sent at most while no unit replies as it should.
 const TRIES: u8 = 3;
 
-/// Number of rounds after which a scan ends on a line where no two of them find the same.
+/// Number of rounds after which a scan ends on a line where no round is undisturbed.
 const ROUNDS: u8 = 8;
 
 /// What was received after a request of a scan.
@@ -24,16 +24,19 @@ pub enum Heard {
 /// A scan of one line.
 ///
 /// A unit whose reply was damaged counts itself as found, and a unit that did not receive the start of the scan may do so
-/// too. Both are hidden until the next start. So a scan goes on in rounds until two in a row have found the same.
+/// too. Both are hidden until the next start. So a scan goes on in rounds until two in a row have found the same, and one
+/// of them was without disturbance: the same unit may be hidden twice.
 #[derive(Debug, Default)]
 pub struct Scan {
     units: BTreeMap<u32, u8>,
     /// Units of this round.
     round: BTreeSet<(u32, u8)>,
-    /// Units of the round before.
-    before: Option<BTreeSet<(u32, u8)>>,
+    /// Units of the round before, and whether each request of that round had its reply.
+    before: Option<(BTreeSet<(u32, u8)>, bool)>,
     /// A unit has replied in this round, also if its reply was damaged.
     has_begun: bool,
+    /// A request of this round had no reply, or a damaged one.
+    has_failed: bool,
     tries: u8,
     rounds: u8,
     has_ended: bool,
@@ -84,6 +87,7 @@ impl Scan {
     }
 
     fn failed(&mut self) {
+        self.has_failed = true;
         self.tries += 1;
         if self.tries == TRIES {
             self.end_round();
@@ -92,12 +96,19 @@ impl Scan {
 
     fn end_round(&mut self) {
         let round = std::mem::take(&mut self.round);
-        self.rounds += 1;
-        let is_silent = !self.has_begun && self.units.is_empty();
-        self.has_ended = is_silent || self.before.as_ref() == Some(&round) || self.rounds == ROUNDS;
-        self.before = Some(round);
-        self.has_begun = false;
+        let is_good = !std::mem::take(&mut self.has_failed);
+        let has_begun = std::mem::take(&mut self.has_begun);
         self.tries = 0;
+        self.rounds += 1;
+        self.has_ended = self.rounds == ROUNDS
+            || match &self.before {
+                // A line without units needs no undisturbed round.
+                Some((before, was_good)) => {
+                    *before == round && (is_good || *was_good || self.units.is_empty())
+                }
+                None => !has_begun,
+            };
+        self.before = Some((round, is_good));
     }
 }
 
@@ -150,6 +161,14 @@ mod tests {
     }
 
     #[test]
+    fn a_unit_whose_replies_are_damaged_in_two_rounds_is_found_in_the_third() {
+        let damaged = |n| [1, 5].contains(&n).then_some(Heard::Damaged);
+        let (scan, requests) = scan(&[1, 2, 3], damaged);
+        assert_eq!(found(&scan), [1, 2, 3]);
+        assert_eq!(requests, 4 * 4);
+    }
+
+    #[test]
     fn a_damaged_first_reply_does_not_start_the_scan_again() {
         let (scan, _) = scan(&[1], |n| (n == 0).then_some(Heard::Damaged));
         assert_eq!(found(&scan), [1]);
@@ -195,9 +214,10 @@ mod tests {
     }
 
     #[test]
-    fn a_unit_that_is_found_again_and_again_ends_the_round() {
+    fn a_unit_that_is_found_again_and_again_does_not_keep_the_scan_going() {
         let again = Heard::Reply(Reply::Found { serial: 9, unit: 9 });
         let (scan, requests) = scan(&[9], |_| Some(again.clone()));
-        assert_eq!((found(&scan), requests), (vec![9], 2 * 4));
+        assert_eq!(found(&scan), [9]);
+        assert_eq!(requests, 4 * usize::from(ROUNDS));
     }
 }

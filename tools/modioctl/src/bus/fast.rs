@@ -5,6 +5,7 @@ use std::io;
 use std::time::Duration;
 
 use modbus_line::fast::{ADDRESS, Heard, Reply, Request, Scan};
+use tokio::time::Instant;
 
 use super::adu::Framing;
 use super::endpoint::{Endpoint, Place};
@@ -67,7 +68,10 @@ impl Master {
                 return Ok(reply);
             }
             if !got.is_empty() {
-                until = late + to_end;
+                // A busy computer delivers a reply in pieces with a pause between them.
+                let end = late + to_end;
+                until = end.max(Instant::now() + ADAPTER);
+                until = until.min(end + self.endpoint().timeout);
             }
         }
         if got.is_empty() {

@@ -11,9 +11,9 @@ Fast Modbus (function 70) in RTU: units report what has changed, and one request
 change is printed once, and none is lost while the unit has room for 32 edges; events that waited before the command began \
 come first. Only one program can fetch events on a line.
 
-Fetching counts as traffic: it keeps the outputs of a unit with COMM_TIMEOUT alive, unless COMM_SOURCE is 1 or 3. Units of \
-other makers take part, but are not switched on; with units of another maker on the line it is not promised that the \
-arbitration always finds one winner.")]
+Fetching counts as traffic: it keeps the outputs of a unit with COMM_TIMEOUT alive, unless COMM_SOURCE is 1 or 3. Events \
+of units of other makers are printed too, but this command does not switch them on. With units of several makers on one \
+line replies may collide: their arbitration can differ.")]
 pub struct Events {
     /// Addresses of the units, such as 1-3,7; default: all units that a scan with function 70 finds
     #[arg(long, value_name = "LIST", value_parser = units)]
