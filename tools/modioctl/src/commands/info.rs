@@ -6,7 +6,7 @@ use modbus_line::names;
 use register_map::configuration::{BAUD, FRAME_GAP};
 use register_map::state::update;
 use register_map::update::State;
-use register_map::{fault, radio, state};
+use register_map::{edges, fault, radio, state};
 use serde_json::{Map, Value as Json, json};
 
 use crate::bus::{Lost, decode};
@@ -37,7 +37,9 @@ const fn group(address: u16) -> &'static str {
     match address {
         BAUD..=FRAME_GAP | state::UNIT_ADDRESS => "line",
         state::RESET_CAUSE..=state::STACK_FREE | state::UPDATE => "state",
-        state::MODULE_IN_FORCE..state::UNIQUE_ID | state::CHANNEL_STATUS..fault::KIND => "modules",
+        state::MODULE_IN_FORCE..state::UNIQUE_ID
+        | state::CHANNEL_STATUS..fault::KIND
+        | edges::LAST_EDGE..=0x03BF => "modules",
         state::BUS_MESSAGES..state::CHANNEL_STATUS | radio::BUS_MESSAGES..=radio::T15_GAPS => {
             "counters"
         }
