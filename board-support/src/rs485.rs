@@ -200,6 +200,8 @@ impl Uart for Rs485 {
         }
     }
 
+    // The first byte of a reply must not wait for a call.
+    #[inline(always)]
     fn start_sending(&mut self, first: u8) {
         DRIVER.set(true);
         // Reading SR and then writing DR clears TC (RM0008 27.6.1).

@@ -80,7 +80,6 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
     /// been sent, or a request waits to be served.
     #[inline]
     pub fn on_uart(&mut self, now_ms: impl FnOnce() -> u32) -> bool {
-        let mut waits = false;
         let status = self.uart.status();
         // Checked first, because another station may drive the bus within a bit time after the last stop bit.
         if U::sent(status) {
@@ -93,7 +92,8 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
             let character = self.uart.read(status);
             let faults = Faults::from_bits(character.faults);
             if self.port.received(character.byte, faults) && HAS_EVENTS {
-                waits = self.on_special(character.byte, now_ms());
+                // If the UART wants a byte, too, it raises the interrupt again.
+                return self.on_special(character.byte, now_ms());
             }
             self.gap.restart();
         }
@@ -105,7 +105,7 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         } else if !U::received(status) {
             self.repaired |= self.uart.disable_other_interrupts();
         }
-        waits
+        false
     }
 
     /// Handles a character that may end a message of Fast Modbus, or is one of an arbitration. Returns whether a request
@@ -119,6 +119,7 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         if waits {
             self.ended = Some(self.gap.end_of(character));
         }
+        self.gap.restart();
         waits
     }
 
@@ -236,7 +237,7 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn begin(&mut self, first: u8) {
         self.gap.stop();
         self.sending_ms = 0;

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{Points, crc, frame};
-use modbus_server::fast::{self, EventSource, Kind, Packet, Part, Setting, Waiting};
+use modbus_server::fast::{self, Contest, EventSource, Kind, Packet, Part, Setting, Waiting};
 use modbus_server::line::{Arbitration, FastUnit, Faults, Framing, Port, Receiver, Turn, Windows};
 use modbus_server::{
     Adu, Bits, BitsOut, DataModel, Exception, Server, Span, Table, Words, WordsOut,
@@ -138,7 +138,7 @@ impl Unit {
         if !waits {
             waits = self.port.long_silence(0);
         }
-        let Some(request) = self.port.take().filter(|_| waits) else {
+        let Some(mut request) = self.port.take().filter(|_| waits) else {
             return Answer::Silence;
         };
         if request.unit() != fast::ADDRESS {
@@ -146,9 +146,13 @@ impl Unit {
             self.port.send(reply, 0);
             return common::send(&mut self.port).map_or(Answer::Silence, Answer::Usual);
         }
-        let (reply, contest) = self
-            .server
-            .serve_fast(request, &mut self.unit, &mut self.device);
+        let (reply, contest) = if self.unit.open(&mut request) {
+            let mut reply = self.server.serve(request, &mut self.device);
+            self.unit.close(&mut reply);
+            (reply, Contest::default())
+        } else {
+            (self.server).serve_fast(request, &mut self.unit, &mut self.device)
+        };
         let windows = Windows {
             start: 1_000,
             length: 100,

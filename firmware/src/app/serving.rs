@@ -11,7 +11,11 @@ use firmware::{
     config::{LineName, Origin},
     start_up::RECOVERY_UNIT,
 };
-use modbus_server::{LineCounters, Outcome, Request, Server, fast, line::Framing};
+use modbus_server::{
+    LineCounters, Outcome, Request, Server,
+    fast::{self, Contest},
+    line::Framing,
+};
 use register_map::codes::Command;
 use rtic::Mutex;
 
@@ -130,7 +134,7 @@ impl Served {
     #[inline(never)]
     fn serve(
         &mut self,
-        request: Request<'static>,
+        mut request: Request<'static>,
         unit: &mut fast::Unit,
         rs485: &mut impl Mutex<T = Option<Line>>,
         radio: &mut impl Mutex<T = Option<Radio>>,
@@ -141,28 +145,65 @@ impl Served {
             broadcast: request.unit() == BROADCAST,
         };
         let ended = request.ended();
-        let (reply, contest, delay_ms) = device.lock(|device| {
+        let is_fast = HAS_EVENTS && request.unit() == fast::ADDRESS;
+        if is_fast && !unit.open(&mut request) {
+            return self.serve_for_all(request, unit, rs485, device);
+        }
+        let (mut reply, delay_ms) = device.lock(|device| {
             let delay_ms = device.config.response_delay_ms();
             device.set_origin(origin);
-            if HAS_EVENTS && request.unit() == fast::ADDRESS {
-                let (reply, contest) = self.server.serve_fast(request, unit, &mut **device);
-                return (reply, Some(contest), 0);
-            }
-            (self.server.serve(request, &mut **device), None, delay_ms)
+            (self.server.serve(request, &mut **device), delay_ms)
         });
         let (outcome, writes) = (reply.outcome(), reply.writes());
-        match (self.line, contest) {
-            (LineName::Rs485, Some(contest)) if HAS_EVENTS => {
+        match self.line {
+            LineName::Rs485 if is_fast => {
+                unit.close(&mut reply);
+                let contest = Contest::default();
                 rs485.lock(|line| line.as_mut().map(|line| line.arbitrate(reply, contest)));
             }
-            (LineName::Rs485, _) => {
+            LineName::Rs485 => {
                 let delay_ms = if self.at_once { 0 } else { delay_ms };
                 rs485.lock(|line| line.as_mut().map(|line| line.send(reply, delay_ms)));
             }
-            (LineName::Radio, _) => {
+            LineName::Radio => {
                 radio.lock(|line| line.as_mut().map(|line| line.send_reply(reply)));
             }
         }
+        self.end(ended, outcome, writes, device);
+    }
+
+    /// Serves a request of function 70 to all units, which only the RS-485 line takes.
+    #[cold]
+    #[inline(never)]
+    fn serve_for_all(
+        &mut self,
+        request: Request<'static>,
+        unit: &mut fast::Unit,
+        rs485: &mut impl Mutex<T = Option<Line>>,
+        device: &mut impl Mutex<T = &'static mut Device>,
+    ) {
+        let ended = request.ended();
+        let (reply, contest) = device.lock(|device| {
+            device.set_origin(Origin {
+                line: self.line,
+                broadcast: false,
+            });
+            self.server.serve_fast(request, unit, &mut **device)
+        });
+        let (outcome, writes) = (reply.outcome(), reply.writes());
+        rs485.lock(|line| line.as_mut().map(|line| line.arbitrate(reply, contest)));
+        self.end(ended, outcome, writes, device);
+    }
+
+    /// Does what follows a request after its reply has begun.
+    #[inline(always)]
+    fn end(
+        &mut self,
+        ended: u32,
+        outcome: Outcome,
+        writes: bool,
+        device: &mut impl Mutex<T = &'static mut Device>,
+    ) {
         self.server.settle();
         self.order = device.lock(|device| {
             // In listen-only mode requests do not count, so that the outputs go to SAFE.

@@ -15,8 +15,8 @@
 //!
 //! A line with a [`FastUnit`](crate::line::FastUnit) recognises these messages at their last byte
 //! ([`Port::ends_fast_message`](crate::line::Port::ends_fast_message)), because units begin to arbitrate, and masters to
-//! send the next request, before t3.5 has passed. A [`Unit`] serves the requests with
-//! [`Server::serve_fast`](crate::Server::serve_fast), and [`Port::arbitrate`](crate::line::Port::arbitrate) takes the
+//! send the next request, before t3.5 has passed. A request to a serial number is opened by [`Unit::open`] and then served
+//! as any other; [`Server::serve_fast`](crate::Server::serve_fast) serves the other ones for a [`Unit`], and [`Port::arbitrate`](crate::line::Port::arbitrate) takes the
 //! reply. Sub-function 18 has the unit's own address: a data model serves it as a user-defined function, with
 //! [`check_settings`] and [`apply_settings`].
 

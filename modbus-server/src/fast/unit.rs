@@ -2,7 +2,7 @@
 
 use super::{ADDRESS, EventSource, FUNCTION, Kind, Packet, SERIAL_AHEAD, sub};
 use crate::server::refuse;
-use crate::{Adu, DataModel, Exception, Function, Outcome, Reply, Request, Server};
+use crate::{Adu, Exception, Function, Outcome, Reply, Request, Server};
 
 /// Bits in front of the serial number of a unit that was not found yet, and of one that was.
 const NOT_FOUND: u32 = 0b0110 << 28;
@@ -75,6 +75,50 @@ impl Unit {
             in_a_row: 0,
             packet: Packet::new(),
             contended: Contended::Nothing,
+        }
+    }
+
+    /// Opens a request to [`ADDRESS`] if it is for this unit alone, by its serial number: it is the request inside then, to
+    /// be served by [`Server::serve`]. [`close`](Self::close) its reply.
+    #[must_use]
+    pub fn open(&self, request: &mut Request<'_>) -> bool {
+        let adu = &mut *request.adu;
+        let is_for_unit = adu.get(1) == FUNCTION
+            && adu.get(2) == sub::REQUEST
+            && adu.len() > 7
+            && adu.from(3).starts_with(&self.serial.to_be_bytes())
+            && self.part != Part::Scans;
+        if !is_for_unit {
+            return false;
+        }
+        adu.drop_front(SERIAL_AHEAD);
+        // Not the address of a broadcast, also for a unit without an address.
+        adu.set(0, ADDRESS);
+        // What is not served in this way becomes a request that the server refuses with the right exception.
+        let code = adu.get(1);
+        if code == Function::Diagnostics.code() || code == FUNCTION {
+            // No such sub-function: 01.
+            adu.set(2, 0xFF);
+        } else if code == Function::ReadWriteMultipleRegisters.code()
+            && u16::from_be_bytes([adu.get(4), adu.get(5)]) > MAX_WORDS
+        {
+            // No such quantity: 03. Later it would have written already.
+            adu.set(4, 0xFF);
+        }
+        true
+    }
+
+    /// Makes the reply to a request that was [opened](Self::open) one of this unit's serial number.
+    pub fn close(&self, reply: &mut Reply<'_>) {
+        let adu = &mut *reply.adu;
+        if !adu.add_front(SERIAL_AHEAD) {
+            // It has read something: all other replies are no longer than their requests.
+            reply.outcome = refuse(adu, Exception::IllegalDataValue.into());
+            adu.add_front(SERIAL_AHEAD);
+        }
+        let head = [ADDRESS, FUNCTION, sub::REPLY].into_iter();
+        for (at, byte) in (0..).zip(head.chain(self.serial.to_be_bytes())) {
+            adu.set(at, byte);
         }
     }
 
@@ -164,11 +208,11 @@ impl Unit {
 }
 
 impl Server {
-    /// Serves a request to [`ADDRESS`], of the same line, and makes its buffer the reply. Returns the reply, and with
-    /// which bits it takes part in the arbitration.
+    /// Serves a request to [`ADDRESS`], of the same line, that is not [for the unit alone](Unit::open), and makes its buffer
+    /// the reply. Returns the reply, and with which bits it takes part in the arbitration.
     ///
     /// Requests that the unit does not take part in have no reply, as all others that it does not know.
-    pub fn serve_fast<'a, M: DataModel + EventSource>(
+    pub fn serve_fast<'a, M: EventSource>(
         &mut self,
         request: Request<'a>,
         unit: &mut Unit,
@@ -183,14 +227,6 @@ impl Server {
             _ if self.is_listen_only() => {
                 outcome = Outcome::NotObeyed;
                 None
-            }
-            (sub::REQUEST, 8..)
-                if adu.from(3).starts_with(&unit.serial.to_be_bytes())
-                    && is_fast
-                    && unit.part != Part::Scans =>
-            {
-                let reply = self.serve_by_serial(request, unit, model);
-                return (reply, Contest::default());
             }
             (sub::START_SCAN, 3) if is_fast => {
                 unit.is_found = false;
@@ -214,46 +250,5 @@ impl Server {
             writes: false,
         };
         (reply, contest.unwrap_or_default())
-    }
-
-    /// Serves the request inside a request to the unit's serial number.
-    fn serve_by_serial<'a>(
-        &mut self,
-        request: Request<'a>,
-        unit: &Unit,
-        model: &mut impl DataModel,
-    ) -> Reply<'a> {
-        let adu = &mut *request.adu;
-        adu.drop_front(SERIAL_AHEAD);
-        // Not the address of a broadcast, also for a unit without an address.
-        adu.set(0, ADDRESS);
-        let refusal = match adu.get(1) {
-            code if code == Function::Diagnostics.code() || code == FUNCTION => {
-                Some(Exception::IllegalFunction)
-            }
-            code if code == Function::ReadWriteMultipleRegisters.code()
-                && u16::from_be_bytes([adu.get(4), adu.get(5)]) > MAX_WORDS =>
-            {
-                Some(Exception::IllegalDataValue)
-            }
-            _ => None,
-        };
-        let mut reply = match refusal {
-            Some(exception) => self.refuse_at_once(request, exception),
-            None => self.serve(request, model),
-        };
-        if reply.is_answered {
-            let adu = &mut *reply.adu;
-            if !adu.add_front(SERIAL_AHEAD) {
-                // It read something, because 17 was refused and all other replies are no longer than their requests.
-                reply.outcome = refuse(adu, Exception::IllegalDataValue.into());
-                adu.add_front(SERIAL_AHEAD);
-            }
-            let head = [ADDRESS, FUNCTION, sub::REPLY].into_iter();
-            for (at, byte) in (0..).zip(head.chain(unit.serial.to_be_bytes())) {
-                adu.set(at, byte);
-            }
-        }
-        reply
     }
 }

@@ -165,7 +165,7 @@ impl<'a, U: Units> Port<'a, U> {
         if matches!(self.reply, State::Waiting(_)) {
             self.drop_reply();
         }
-        if U::FAST {
+        if U::FAST && self.contender.is_some() {
             self.withdraw();
         }
         Some(Request {

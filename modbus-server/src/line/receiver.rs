@@ -8,7 +8,7 @@ use super::state::{
 };
 use super::{Faults, Framing, Units, length};
 use crate::counters::count;
-use crate::{Adu, BROADCAST, LineCounters, crc};
+use crate::{Adu, BROADCAST, LineCounters, crc, fast};
 
 /// The receiving half of a line (V1.02 2.5.1.1, figure 14, for RTU; 2.5.2.1, figure 17, for ASCII).
 ///
@@ -130,7 +130,13 @@ impl<'a, U: Units> Receiver<'a, U> {
         let check = crc::step(self.check, byte);
         self.check = check;
         self.keep(byte);
-        U::FAST && check == crc::GOOD
+        U::FAST && check == crc::GOOD && self.is_for_fast()
+    }
+
+    /// Returns whether the frame so far has the function code of Fast Modbus.
+    #[inline(always)]
+    fn is_for_fast(&self) -> bool {
+        (self.filling.as_ref()).is_some_and(|adu| adu.get(1) == fast::FUNCTION)
     }
 
     /// Notes that 1.5 characters of silence have passed, in RTU mode. Has no effect in ASCII mode.
@@ -229,11 +235,13 @@ impl<'a, U: Units> Receiver<'a, U> {
     }
 
     /// Returns whether a valid RTU frame is a reply of Fast Modbus, and notes what follows it.
-    #[inline]
+    #[inline(never)]
     fn is_fast_reply(&mut self) -> bool {
+        if !self.units.is_fast() {
+            return false;
+        }
         let frame = self.filling.as_ref();
         let message = frame.and_then(|adu| Message::of(adu));
-        self.state &= !(FOLLOWS | QUIET);
         self.state |= match message {
             Some(Message::Request) => FOLLOWS,
             Some(Message::Reply) => QUIET,
@@ -306,7 +314,13 @@ impl<'a, U: Units> Receiver<'a, U> {
             return None;
         }
         count(&mut self.counters.bus_messages);
-        if self.units.is_fast() && self.is_fast_reply() || !self.takes(address) {
+        if U::FAST {
+            self.state &= !(FOLLOWS | QUIET);
+            if self.is_for_fast() && self.is_fast_reply() {
+                return None;
+            }
+        }
+        if !self.takes(address) {
             return None;
         }
         if state & (TORN | UNKEPT) != 0 {

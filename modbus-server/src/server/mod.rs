@@ -6,9 +6,7 @@ mod tally;
 use crate::diagnostic::Diagnostic;
 use crate::events::EventLog;
 use crate::line::Framing;
-use crate::{
-    Adu, BROADCAST, Counters, DataModel, Exception, Function, LineCounters, Outcome, Reply, Request,
-};
+use crate::{Adu, BROADCAST, Counters, DataModel, Function, LineCounters, Outcome, Reply, Request};
 pub(crate) use execute::Refusal;
 use execute::{Effect, execute};
 use tally::{Sent, Tally};
@@ -104,20 +102,6 @@ impl Server {
             framing: self.framing,
             outcome: executed.map_or_else(|outcome| outcome, |_| Outcome::Accepted),
             writes: executed == Ok(Effect::Written),
-        }
-    }
-
-    /// Counts a request to this unit and answers it with an exception.
-    pub(crate) fn refuse_at_once<'a>(&mut self, request: Request<'a>, why: Exception) -> Reply<'a> {
-        self.begin(&request.line, false, true);
-        let outcome = refuse(request.adu, why.into());
-        self.end(Err(outcome), true);
-        Reply {
-            adu: request.adu,
-            is_answered: true,
-            framing: self.framing,
-            outcome,
-            writes: false,
         }
     }
 

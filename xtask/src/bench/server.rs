@@ -15,10 +15,10 @@ use crate::size::{Source, structures};
 
 const CRATE: &str = "modbus_server";
 
-/// The structures that a line needs, and their numbers.
+/// The structures that a line needs, and their numbers. Their parameters do not matter.
 const STRUCTURES: [(&str, u64); 4] = [
     ("Server", 1),
-    ("Receiver<u8>", 1),
+    ("Receiver", 1),
     ("Transmitter", 1),
     ("Adu", 2),
 ];
@@ -76,7 +76,11 @@ fn replace(report: &mut Value, is_server: impl Fn(u32) -> Option<bool>) -> Optio
 /// Returns the server's RAM: its structures, with the two buffers of a line.
 fn ram(sizes: &BTreeMap<String, u64>) -> Result<u64> {
     let size = |(name, count): &(&str, u64)| {
-        let size = sizes.get(*name).map(|size| size * count);
+        let of = |full: &str| full.split('<').next() == Some(*name);
+        let size = sizes
+            .iter()
+            .find(|(full, _)| of(full))
+            .map(|(_, size)| size * count);
         size.with_context(|| format!("the debug information has no {CRATE}::{name}"))
     };
     STRUCTURES.iter().map(size).sum()
