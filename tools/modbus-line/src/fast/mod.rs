@@ -19,6 +19,7 @@
 mod fetch;
 mod scan;
 mod settings;
+mod words;
 
 use std::ops::Range;
 use std::time::Duration;
@@ -29,6 +30,7 @@ use crate::adu::{Framing, RTU_MOST, response_length};
 pub use fetch::Fetcher;
 pub use scan::{Heard, Scan};
 pub use settings::{Priority, Setting, are_on, settings};
+pub(crate) use words::words;
 
 /// Unit address of requests to all units.
 pub const ADDRESS: u8 = 0xFD;
