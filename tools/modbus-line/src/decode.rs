@@ -1,7 +1,7 @@
 //! Describes requests and responses in words, for people.
 
 use crate::adu::{Framing, RTU_MOST, bytes};
-use crate::{Direction, names};
+use crate::{Direction, fast, names};
 
 /// Describes a frame in words: the unit, and the request or response. `request` is the PDU of the preceding
 /// request, if known: it has the addresses that a response does not repeat.
@@ -21,6 +21,7 @@ pub fn frame(
             };
             match unit {
                 0 => format!("all units: {text}"),
+                fast::ADDRESS if pdu.first() == Some(&fast::FUNCTION) => text,
                 _ => format!("unit {unit}: {text}"),
             }
         }
@@ -53,6 +54,9 @@ fn word(bytes: &[u8], at: usize) -> Option<u16> {
 }
 
 fn named(code: u8) -> String {
+    if code & 0x7F == fast::FUNCTION {
+        return "fast modbus".to_owned();
+    }
     names::function(code).map_or_else(|| format!("function {code:02X}"), str::to_owned)
 }
 
@@ -106,6 +110,7 @@ fn fields(code: u8, pdu: &[u8]) -> Option<String> {
             word(pdu, 5)?,
             words(pdu.get(10..)?)
         ),
+        fast::FUNCTION => fast::words(pdu, None)?,
         0x2B if pdu.get(1) == Some(&0x0E) => format!(
             "read device identification, code {:02X}, from object {:02X}",
             pdu.get(2)?,
@@ -151,6 +156,7 @@ fn answered(code: u8, pdu: &[u8], request: Option<&[u8]>) -> Option<String> {
         0x0C => log(pdu)?,
         0x11 => identity(pdu)?,
         0x14 => groups(pdu)?,
+        fast::FUNCTION => fast::words(pdu, request)?,
         0x2B => {
             let objects = objects(pdu)?.into_iter();
             let texts = objects.map(|(id, text)| format!("{id:02X} \"{text}\""));

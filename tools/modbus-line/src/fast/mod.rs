@@ -16,9 +16,11 @@
 //! assert_eq!(request.find(&reply), Some((Reply::NoneLeft, 2..7)));
 //! ```
 
+mod codes;
 mod fetch;
 mod scan;
 mod settings;
+mod words;
 
 use std::ops::Range;
 use std::time::Duration;
@@ -26,42 +28,16 @@ use std::time::Duration;
 use crate::LineFormat;
 use crate::adu::{Framing, RTU_MOST, response_length};
 
+pub use codes::{kind, sub};
 pub use fetch::Fetcher;
 pub use scan::{Heard, Scan};
 pub use settings::{Priority, Setting, are_on, settings};
+pub(crate) use words::words;
 
 /// Unit address of requests to all units.
 pub const ADDRESS: u8 = 0xFD;
 /// Function code.
 pub const FUNCTION: u8 = 0x46;
-
-/// Sub-functions.
-mod sub {
-    pub const START_SCAN: u8 = 0x01;
-    pub const CONTINUE_SCAN: u8 = 0x02;
-    pub const FOUND: u8 = 0x03;
-    pub const NONE_LEFT: u8 = 0x04;
-    pub const REQUEST: u8 = 0x08;
-    pub const REPLY: u8 = 0x09;
-    pub const FETCH: u8 = 0x10;
-    pub const EVENTS: u8 = 0x11;
-    pub const NO_EVENTS: u8 = 0x12;
-    pub const SETTINGS: u8 = 0x18;
-}
-
-/// Types of events.
-pub mod kind {
-    /// A coil has changed.
-    pub const COIL: u8 = 1;
-    /// A discrete input has changed.
-    pub const DISCRETE_INPUT: u8 = 2;
-    /// A holding register has changed.
-    pub const HOLDING_REGISTER: u8 = 3;
-    /// An input register has changed.
-    pub const INPUT_REGISTER: u8 = 4;
-    /// The unit itself: id 0, it has started. Other ids are the maker's own.
-    pub const UNIT: u8 = 0x0F;
-}
 
 /// A request to all units.
 #[derive(Clone, Debug, PartialEq, Eq)]

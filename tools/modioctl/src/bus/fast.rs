@@ -2,9 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::io;
+use std::path::Path;
 use std::time::Duration;
 
 use modbus_line::fast::{ADDRESS, Heard, Reply, Request, Scan};
+use modbus_line::port::is_pseudo_terminal;
 use tokio::time::Instant;
 
 use super::adu::Framing;
@@ -12,15 +14,16 @@ use super::endpoint::{Endpoint, Place};
 use super::master::{Lost, MOST, Master};
 use crate::failure::Failure;
 
-/// Longest time for which the adapter or a gateway holds bytes back, unless the user gives a time-out.
+/// Longest time for which an adapter holds bytes back.
 const ADAPTER: Duration = Duration::from_millis(60);
+/// The same for a gateway, and for a program at the other end of a pseudo-terminal.
 const GATEWAY: Duration = Duration::from_millis(300);
 
-/// Returns how long the reply of a unit may be late.
-const fn lateness(endpoint: &Endpoint) -> Duration {
-    match endpoint.place {
+/// Returns how long the reply of a unit may be late, unless the user gives a time-out.
+fn lateness(endpoint: &Endpoint) -> Duration {
+    match &endpoint.place {
         _ if endpoint.timeout_given => endpoint.timeout,
-        Place::Serial(_) => ADAPTER,
+        Place::Serial(path) if !is_pseudo_terminal(Path::new(path)) => ADAPTER,
         _ => GATEWAY,
     }
 }

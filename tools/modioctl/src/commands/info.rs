@@ -6,7 +6,7 @@ use modbus_line::names;
 use register_map::configuration::{BAUD, FRAME_GAP};
 use register_map::state::update;
 use register_map::update::State;
-use register_map::{edges, fault, radio, state};
+use register_map::{edges, fault, name, radio, state};
 use serde_json::{Map, Value as Json, json};
 
 use crate::bus::{Lost, decode};
@@ -140,7 +140,9 @@ fn grouped(rows: &[(&str, [String; 2])]) -> Vec<[String; 2]> {
 fn is_state(item: &Item) -> bool {
     let is_read_only = !item.writable && matches!(item.meaning, Meaning::Value(_));
     let is_of_line = item.setting && (BAUD..=FRAME_GAP).contains(&item.address);
-    (is_read_only || is_of_line) && !item.name.starts_with("reserved")
+    // The board's name in letters is for other programs: register BOARD has it, too.
+    let is_shown = !item.name.starts_with("reserved") && item.address != name::NAME;
+    (is_read_only || is_of_line) && is_shown
 }
 
 /// Reason why a unit has no device identification.

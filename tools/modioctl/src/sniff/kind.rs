@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use modbus_line::fast::{self, sub};
 use modbus_line::names;
 
 use super::Request;
@@ -28,13 +29,19 @@ pub fn lengths(bytes: &[u8], open: Option<&Request>) -> Vec<Length> {
     let Some(unit) = bytes.first() else {
         return vec![Length::Later];
     };
+    let Some(function) = bytes.get(1) else {
+        return match unit {
+            248..=252 | 254 => Vec::new(),
+            _ => vec![Length::Later],
+        };
+    };
+    if *function == fast::FUNCTION {
+        return fast_length(bytes, open).into_iter().collect();
+    }
     if (248..=254).contains(unit) {
         return Vec::new();
     }
-    let Some(function) = bytes.get(1) else {
-        return vec![Length::Later];
-    };
-    if names::function(*function).is_none() {
+    if names::function(*function).is_none() && function & 0x7F != fast::FUNCTION {
         return Vec::new();
     }
     if function & 0x80 != 0 {
@@ -59,6 +66,31 @@ pub fn lengths(bytes: &[u8], open: Option<&Request>) -> Vec<Length> {
     vec![known(response), known(request_length(bytes))]
 }
 
+/// Returns the length of the message of Fast Modbus with this beginning; `None` when `bytes` cannot start one.
+fn fast_length(bytes: &[u8], open: Option<&Request>) -> Option<Length> {
+    let Some(sub) = bytes.get(2) else {
+        return Some(Length::Later);
+    };
+    let counted = |at: usize| bytes.get(at).map(|count| at + 1 + usize::from(*count) + 2);
+    // The last byte of the serial number stands for the unit address of a usual frame.
+    let inside = bytes.get(6..).unwrap_or_default();
+    let is_to_all = bytes.first() == Some(&fast::ADDRESS);
+    let length = match (is_to_all, *sub) {
+        (true, sub::START_SCAN | sub::CONTINUE_SCAN | sub::NONE_LEFT | sub::NO_EVENTS) => Some(5),
+        (true, sub::FOUND) => Some(10),
+        (true, sub::FETCH) => Some(9),
+        (true, sub::REQUEST) => request_length(inside).map(|length| 6 + length),
+        (true, sub::REPLY) => {
+            let asked = open.and_then(|open| open.pdu.get(6..)).unwrap_or_default();
+            response_length(asked, inside).map(|length| 6 + length)
+        }
+        (false, sub::EVENTS) => counted(5),
+        (false, sub::SETTINGS) => counted(3),
+        _ => return None,
+    };
+    Some(length.map_or(Length::Later, Length::Known))
+}
+
 /// Returns the request in `open` if a frame of this unit and function can answer that request. A frame that starts
 /// more than `patience` after the request does not answer it.
 pub fn asked(
@@ -80,6 +112,16 @@ pub fn direction(unit: u8, pdu: &[u8], open: Option<&Request>) -> Direction {
     let function = pdu.first().copied().unwrap_or_default();
     if function & 0x80 != 0 {
         return Direction::Response;
+    }
+    if let [fast::FUNCTION, sub, ..] = pdu
+        && *sub != sub::SETTINGS
+    {
+        return match *sub {
+            sub::FOUND | sub::NONE_LEFT | sub::REPLY | sub::EVENTS | sub::NO_EVENTS => {
+                Direction::Response
+            }
+            _ => Direction::Request,
+        };
     }
     let mut frame = vec![unit];
     frame.extend(pdu);

@@ -250,3 +250,42 @@ proptest! {
         prop_assert_eq!(all, bytes);
     }
 }
+
+#[test]
+fn messages_of_fast_modbus_are_split_from_the_arbitration_in_front_of_them() {
+    use Direction::{Request, Response};
+    let serial = [13, 0, 0xA1, 0xB2];
+    let of_serial = |sub, pdu: &[u8]| [&[0x46, sub][..], &serial, pdu].concat();
+    let messages = [
+        (0xFD, Request, vec![0x46, 1]),
+        (0xFD, Response, [&[0x46, 3][..], &serial, &[17]].concat()),
+        (0xFD, Request, vec![0x46, 2]),
+        (0xFD, Response, vec![0x46, 4]),
+        (0xFD, Request, of_serial(8, &[3, 2, 0, 0, 1])),
+        (0xFD, Response, of_serial(9, &[3, 2, 0x23, 0x83])),
+        (0xFD, Request, of_serial(8, &[6, 0, 0x80, 0, 5])),
+        (0xFD, Response, of_serial(9, &[0x86, 2])),
+        (5, Request, vec![0x46, 0x18, 5, 2, 0, 4, 1, 1]),
+        (5, Response, vec![0x46, 0x18, 1, 1]),
+        (5, Request, vec![0x46, 0x18, 1, 1]),
+        (5, Response, vec![0xC6, 3]),
+        (0xFD, Request, vec![0x46, 0x10, 0, 64, 0, 0]),
+        (5, Response, vec![0x46, 0x11, 1, 1, 5, 1, 2, 0, 4, 1]),
+        (0xFD, Request, vec![0x46, 0x10, 0, 64, 5, 1]),
+        (0xFD, Response, vec![0x46, 0x12]),
+    ];
+    let mut bytes = Vec::new();
+    let mut wanted = Vec::new();
+    for (unit, direction, pdu) in messages {
+        let is_arbitrated = pdu[0] == 0x46 && [3, 4, 0x11, 0x12].contains(&pdu[1]);
+        if is_arbitrated {
+            let arbitration = vec![0xFF; 9];
+            bytes.extend(&arbitration);
+            wanted.push((None, arbitration));
+        }
+        bytes.extend(Framing::Rtu.frame(0, unit, &pdu));
+        wanted.push((Some(direction), pdu));
+    }
+    let pieces = splitter(Framing::Rtu).push(&bytes, SECOND);
+    assert_eq!(told(&pieces), wanted);
+}

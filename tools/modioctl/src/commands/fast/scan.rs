@@ -14,8 +14,8 @@ use crate::device::place;
 use crate::failure::Failure;
 use crate::output;
 
-/// Registers that contain the name of the unit, one letter in each, as the maker of function 70 has them.
-const NAME: (u16, u16) = (200, 20);
+/// Number of registers from NAME on, where units of function 70 have their name, one letter in each.
+const LETTERS: u16 = 20;
 
 /// A unit that was found.
 struct Unit {
@@ -156,7 +156,7 @@ async fn identity(master: &mut Master, serial: u32) -> std::io::Result<String> {
             version & 0xFF
         ));
     }
-    match self::words(master, serial, NAME.0, NAME.1).await {
+    match self::words(master, serial, register_map::name::NAME, LETTERS).await {
         Ok(Some(words)) => Ok(name(&words)),
         Ok(None) => Ok("no identification: it has no name".to_owned()),
         Err(lost) => unread(lost),
