@@ -82,11 +82,6 @@ impl Rs485Timer {
         (self.bit, self.us)
     }
 
-    /// Returns the present time of an arbitration.
-    fn now(&self) -> u32 {
-        u32::from(self.start_bit.cnt().read().cnt().bits()) << 16
-    }
-
     /// Returns the time of the last falling edge.
     fn last_edge(&self) -> u32 {
         u32::from(self.start_bit.ccr3().read().ccr().bits()) << 16
@@ -180,6 +175,10 @@ impl GapTimer for Rs485Timer {
             limit: flags & LIMIT != 0,
             wake: flags & WAKE != 0,
         }
+    }
+
+    fn now(&self) -> u32 {
+        u32::from(self.start_bit.cnt().read().cnt().bits()) << 16
     }
 
     fn fell(&mut self) -> Option<u32> {

@@ -65,6 +65,8 @@ pub trait GapTimer {
     /// the reasons.
     fn take_alarms(&mut self) -> Alarms;
 
+    /// Returns the present time.
+    fn now(&self) -> u32;
     /// Returns the time at which the line fell last, if it has fallen since the last call or
     /// [`restart`](Self::restart).
     fn fell(&mut self) -> Option<u32>;

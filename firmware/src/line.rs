@@ -24,7 +24,11 @@ pub type Units = u8;
 #[must_use]
 #[cfg(not(feature = "small"))]
 pub fn units(unit: Option<u8>, is_fast: bool) -> Option<Units> {
-    (unit.is_some() || is_fast).then_some(Units { unit, is_fast })
+    let units = Units {
+        unit: unit.unwrap_or_default(),
+        is_fast,
+    };
+    (unit.is_some() || is_fast).then_some(units)
 }
 
 /// Returns the address of a line, or `None` if it is not served.
@@ -205,10 +209,8 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
 
     /// Takes part in an arbitration, and sends the reply if this unit wins it.
     pub fn arbitrate(&mut self, reply: Reply<'static>, contest: Contest) {
-        // A request with a function of unknown length inside has ended with a silence, so its reply can begin.
-        let Some(ended) = self.ended.take() else {
-            return self.send(reply, 0);
-        };
+        // A request with a function of unknown length inside has ended with a silence.
+        let ended = self.ended.take().unwrap_or_else(|| self.gap.now());
         let Contest { value, windows } = contest;
         let arbitration = Arbitration::new(value, windows, ended, self.windows);
         self.port.arbitrate(reply, arbitration);

@@ -102,7 +102,7 @@ enum Answer {
 impl Unit {
     fn new(part: Part) -> Self {
         let units = FastUnit {
-            unit: Some(ADDRESS),
+            unit: ADDRESS,
             is_fast: true,
         };
         let adus = Box::leak(Box::new([Adu::new(), Adu::new()]));

@@ -39,8 +39,8 @@ struct Served {
 /// The servers of the lines.
 pub struct Serving {
     rs485: Served,
-    /// This unit's part in function 70, which the RS-485 line serves.
-    unit: fast::Unit,
+    /// This unit's part in function 70, which the RS-485 line serves; `None` on a board without it.
+    unit: Option<fast::Unit>,
     radio: Served,
 }
 
@@ -48,7 +48,12 @@ impl Serving {
     /// Creates the servers of a unit. `rs485` is the framing of the RS-485 line and the silence that ends a frame
     /// there, in ms, rounded up. The radio line reports when a frame has ended itself. `points_only`: the radio line
     /// serves points and reads only.
-    pub const fn new(unit: u8, fast: fast::Unit, rs485: (Framing, u32), points_only: bool) -> Self {
+    pub const fn new(
+        unit: u8,
+        fast: Option<fast::Unit>,
+        rs485: (Framing, u32),
+        points_only: bool,
+    ) -> Self {
         let radio = Server::new(Framing::Rtu);
         let radio = if points_only {
             radio.with_read_only_diagnostics()
@@ -106,14 +111,13 @@ impl Serving {
             && let Some(request) = rs485.lock(|line| line.as_mut()?.take())
         {
             self.rs485
-                .serve(request, &mut self.unit, rs485, radio, device);
+                .serve(request, self.unit.as_mut(), rs485, radio, device);
             served = true;
         }
         if self.radio.order.is_none()
             && let Some(request) = radio.lock(|line| line.as_mut()?.take())
         {
-            self.radio
-                .serve(request, &mut self.unit, rs485, radio, device);
+            self.radio.serve(request, None, rs485, radio, device);
             served = true;
         }
         if !served {
@@ -135,7 +139,7 @@ impl Served {
     fn serve(
         &mut self,
         mut request: Request<'static>,
-        unit: &mut fast::Unit,
+        unit: Option<&mut fast::Unit>,
         rs485: &mut impl Mutex<T = Option<Line>>,
         radio: &mut impl Mutex<T = Option<Radio>>,
         device: &mut impl Mutex<T = &'static mut Device>,
@@ -145,8 +149,10 @@ impl Served {
             broadcast: request.unit() == BROADCAST,
         };
         let ended = request.ended();
-        let is_fast = HAS_EVENTS && request.unit() == fast::ADDRESS;
-        if is_fast && !unit.open(&mut request) {
+        let mut unit = unit.filter(|_| HAS_EVENTS && request.unit() == fast::ADDRESS);
+        if let Some(unit) = unit.as_mut()
+            && !unit.open(&mut request)
+        {
             return self.serve_for_all(request, unit, rs485, device);
         }
         let (mut reply, delay_ms) = device.lock(|device| {
@@ -156,8 +162,10 @@ impl Served {
         });
         let (outcome, writes) = (reply.outcome(), reply.writes());
         match self.line {
-            LineName::Rs485 if is_fast => {
-                unit.close(&mut reply);
+            LineName::Rs485 if unit.is_some() => {
+                if let Some(unit) = unit {
+                    unit.close(&mut reply);
+                }
                 let contest = Contest::default();
                 rs485.lock(|line| line.as_mut().map(|line| line.arbitrate(reply, contest)));
             }

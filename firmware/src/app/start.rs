@@ -104,7 +104,11 @@ pub fn up(
 
     let mut sampler = board.sampler;
     let (modules, analog_outputs) = install(installed, &mut sampler, board.dacs);
-    let serial_number = start_up::serial_number(board.unique_id, config.serial_low());
+    let serial_number = if HAS_EVENTS {
+        start_up::serial_number(board.unique_id, config.serial_low())
+    } else {
+        0
+    };
     let is_rtu = settings.mode == Mode::Rtu && HAS_EVENTS;
     let identity = Identity {
         serial_number,
@@ -203,11 +207,10 @@ pub fn up(
         radio_uart,
         serving: Serving::new(
             identity.unit,
-            fast::Unit::new(
-                serial_number,
-                identity.unit,
-                start_up::part(address, board.clock.is_crystal()),
-            ),
+            HAS_EVENTS.then(|| {
+                let part = start_up::part(address, board.clock.is_crystal());
+                fast::Unit::new(serial_number, identity.unit, part)
+            }),
             (framing, t35.div_ceil(1_000_000)),
             points_only,
         ),

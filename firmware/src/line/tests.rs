@@ -151,6 +151,10 @@ impl GapTimer for FakeGap {
         core::mem::take(&mut self.alarms)
     }
 
+    fn now(&self) -> u32 {
+        self.now
+    }
+
     fn fell(&mut self) -> Option<u32> {
         self.fell.take()
     }

@@ -62,7 +62,7 @@ impl Unit {
         let config = Config::new(&MODIO_02, settings, false);
         let device = Device::new_in(place_of_device, config, identity, DESCRIPTION);
         let units = FastUnit {
-            unit: Some(address),
+            unit: address,
             is_fast: true,
         };
         let adus = Box::leak(Box::new([Adu::new(), Adu::new()]));

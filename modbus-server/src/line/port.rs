@@ -138,11 +138,7 @@ impl<'a, U: Units> Port<'a, U> {
             }
             return false;
         }
-        let waits = self.close(now);
-        if U::FAST {
-            self.receiver.end_quiet();
-        }
-        waits
+        self.close(now)
     }
 
     fn close(&mut self, ended: u32) -> bool {

@@ -255,12 +255,6 @@ impl<'a, U: Units> Receiver<'a, U> {
         self.state = self.state & !FOLLOWS | QUIET;
     }
 
-    /// Ends [`QUIET`]: the line has been silent since the reply.
-    #[inline]
-    pub(super) const fn end_quiet(&mut self) {
-        self.state &= !QUIET;
-    }
-
     /// Drops what is in front of the reply of Fast Modbus that the last three characters begin, if they do. While units
     /// arbitrate, several start bits can overlap, so that these characters need not be FF.
     fn seek_reply(&mut self) {
@@ -289,6 +283,9 @@ impl<'a, U: Units> Receiver<'a, U> {
     #[inline]
     fn judge(&mut self, state: u16) -> Option<&'a mut Adu> {
         if state & (DEAF | IDLE) != 0 {
+            if U::FAST {
+                self.state &= !QUIET;
+            }
             return None;
         }
         if state & OVERRUN != 0 {
@@ -311,6 +308,7 @@ impl<'a, U: Units> Receiver<'a, U> {
             if state & (FOLLOWS | QUIET) == 0 {
                 count(&mut self.counters.communication_errors);
             }
+            self.state &= !QUIET;
             return None;
         }
         count(&mut self.counters.bus_messages);

@@ -31,9 +31,9 @@ impl Units for u8 {
 /// The unit address of a unit that serves [Fast Modbus](crate::fast), on an RTU line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FastUnit {
-    /// `None` for a unit without an address. It takes requests to [`fast::ADDRESS`](crate::fast::ADDRESS) only, so that
+    /// The address; 0 for a unit without one. That takes requests to [`fast::ADDRESS`](crate::fast::ADDRESS) only, so that
     /// it can be found.
-    pub unit: Option<u8>,
+    pub unit: u8,
     /// Whether messages of Fast Modbus are recognised, and requests to [`fast::ADDRESS`](crate::fast::ADDRESS) taken. Not
     /// on an ASCII line.
     pub is_fast: bool,
@@ -44,7 +44,7 @@ impl Units for FastUnit {
 
     #[inline(always)]
     fn contains(&self, unit: u8) -> bool {
-        self.unit == Some(unit) || self.is_fast && unit == crate::fast::ADDRESS
+        self.unit == unit || self.is_fast && unit == crate::fast::ADDRESS
     }
 
     #[inline(always)]
@@ -54,7 +54,7 @@ impl Units for FastUnit {
 
     #[inline(always)]
     fn takes_broadcasts(&self) -> bool {
-        self.unit.is_some()
+        self.unit != 0
     }
 }
 

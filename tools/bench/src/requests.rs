@@ -22,6 +22,8 @@ const FOUR: u32 = 850;
 const SIXTEEN: u32 = 1500;
 const SHORT: u32 = 850;
 const SETTING: u32 = 1300;
+/// What a board that serves function 70 may take in addition: each frame may be a message of it.
+const FAST: u32 = 40;
 /// What ASCII mode may take in addition.
 const ASCII: u32 = 50;
 
@@ -87,6 +89,10 @@ pub fn all(board: &Board) -> Vec<Request> {
     let mut requests = of_any_board(board.points().start);
     if board.slots > 1 {
         requests.extend(of_all_slots(board));
+        // The board with one slot has no room for function 70.
+        requests
+            .iter_mut()
+            .for_each(|request| request.to_first_byte += FAST);
     }
     requests
 }
