@@ -122,7 +122,7 @@ impl<'a, U: Units> Receiver<'a, U> {
         if special != 0 {
             if special != IDLE {
                 self.special(byte, faults);
-                return U::FAST;
+                return U::FAST && self.state & ASCII == 0;
             }
             // The first character of an RTU frame needs no other treatment, because everything is prepared for it.
             self.state = 0;
