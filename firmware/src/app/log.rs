@@ -151,7 +151,7 @@ impl Log {
             Address::Unit(unit) => self.write(Line::of("unit address ").number(unit.into())),
             Address::Recovery => self.write(&mut Line::of("unit address 255 (recovery mode)")),
             Address::Invalid => {
-                let text = ", which is no unit address: the line stays silent";
+                let text = ": no unit address";
                 self.write(
                     Line::of("WARN SW01 shows ")
                         .number(start.dip.into())
