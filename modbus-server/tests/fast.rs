@@ -357,6 +357,29 @@ fn a_packet_that_was_never_sent_cannot_be_confirmed() {
 }
 
 #[test]
+fn other_requests_in_between_do_not_change_what_was_sent() {
+    let mut unit = Unit::new(Part::Everything);
+    unit.device.has_started = false;
+    unit.device.events = vec![(7, 1)];
+    let usual = [ADDRESS, 3, 0, 0, 0, 1];
+    let by_serial = bytes("FD 46 08 00 01 EB 37 03 00 00 00 01");
+    let none = (0b1111, bytes("FD 46 12"));
+    // A packet was sent, then others are served, then it is confirmed.
+    let packet = bytes("05 46 11 00 01 05 01 02 00 07 01");
+    assert_eq!(unit.fetch(0, 0).1, packet);
+    assert!(matches!(unit.ask(&usual), Answer::Usual(_)));
+    assert!(matches!(unit.ask(&by_serial), Answer::After(0, 0, _)));
+    assert_eq!(unit.fetch(5, 0), none);
+    // A packet was not sent, because another unit won. A reply to the serial number does not change that.
+    unit.device.events = vec![(8, 1)];
+    let fetch = bytes("FD 46 10 00 64 05 01");
+    assert_eq!(unit.ask_losing_in(&fetch, Some(0)), Answer::Silence);
+    assert!(matches!(unit.ask(&by_serial), Answer::After(0, 0, _)));
+    let packet = bytes("05 46 11 01 01 05 01 02 00 08 01");
+    assert_eq!(unit.fetch(5, 1).1, packet);
+}
+
+#[test]
 fn room_and_least_address_limit_a_packet() {
     let mut unit = Unit::new(Part::Everything);
     unit.device.events = vec![(7, 1), (8, 0), (9, 1)];

@@ -81,7 +81,8 @@ impl Unit {
     /// Opens a request to [`ADDRESS`] if it is for this unit alone, by its serial number: it is the request inside then, to
     /// be served by [`Server::serve`]. [`close`](Self::close) its reply.
     #[must_use]
-    pub fn open(&self, request: &mut Request<'_>) -> bool {
+    pub fn open(&mut self, request: &mut Request<'_>) -> bool {
+        self.end_contest(request.won);
         let adu = &mut *request.adu;
         let is_for_unit = adu.get(1) == FUNCTION
             && adu.get(2) == sub::REQUEST

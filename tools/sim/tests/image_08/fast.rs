@@ -162,6 +162,9 @@ fn fetch_all(master: &mut Master) -> Vec<(u8, u8, u8)> {
             return events;
         };
         last = (*unit, *flag);
+        // A master that knows nothing of it polls between.
+        let poll = master.ask(&[*unit, 2, 0, FIRST, 0, 4], 0);
+        assert_eq!(poll.expect("a reply").0[..2], [*unit, 2]);
         // The packet with the start, which was not confirmed, is sent again.
         for event in packet.chunks(5).filter(|event| *event != [0, 0x0F, 0, 0]) {
             let [1, 2, 0, id, level] = event else {
@@ -202,7 +205,6 @@ fn events_come_from_the_unit_that_has_them_high_ones_first() {
             master.bus.run_for(Time::from_ms(20));
             let expected = [2, 1, 247].map(|unit| (unit, 2, level));
             assert_eq!(fetch_all(&mut master), expected, "{baud:?}");
-            // A master that knows nothing of it polls between.
             for unit in [1, 2, 3, 247] {
                 let (reply, _) = master.ask(&[unit, 2, 0, FIRST, 0, 4], 0).expect("a reply");
                 assert_eq!(reply, [unit, 2, 1, level << 1], "{baud:?}");
