@@ -48,7 +48,7 @@ const VARYING: [(&str, u32); 7] = [
     ("TIM1 CCMR2", 0b11),
     ("TIM2 CR1", 1),
     ("TIM2 DIER", 1 << 2),
-    ("TIM1 DIER", 1 << 1),
+    ("TIM1 DIER", 0b11 << 1),
     ("USART1 SR.TC", 1 << 6),
     ("TIM2 CNT", 0xFFFF),
 ];
