@@ -10,7 +10,7 @@ const LATE: Most = Most(Time::from_us(25), Time::from_us(45));
 /// From enabling the driver to the write of the first byte to the UART's data register.
 const ON: Most = Most(Time::from_us(1), Time::from_us(1));
 /// From the last stop bit to disabling the driver.
-const OFF: Most = Most(Time::from_ns(1_250), Time::from_ns(2_300));
+const OFF: Most = Most(Time::from_ns(1_300), Time::from_ns(2_350));
 /// The same when another interrupt of the line, usually the 1 kHz tick, has just occurred: the longest wait that `cargo
 /// xtask bench` allows, 5.0 us, and the handler; at the slow corner the time of [`Bench::ready`] at high rates.
 const OFF_BEHIND: Most = Most(Time::from_ns(6_250), Time::from_us(10));
