@@ -472,12 +472,16 @@ fn errors_count_again_after_the_silence_behind_a_reply() {
     let mut unit = Unit::new(Part::Requests);
     let noise = [1, 2, 3, 4, 5];
     unit.ask(&bytes("FD 46 01"));
-    unit.characters(&noise);
+    unit.characters(&noise[..2]);
+    // A window of an arbitration in which nobody sends.
+    unit.port.short_silence(0);
+    unit.characters(&noise[2..]);
     unit.port.long_silence(0);
     unit.characters(&bytes("FD 46 04 D3 93"));
     unit.characters(&noise);
     unit.port.long_silence(0);
-    assert_eq!(unit.port.counters().communication_errors, 0);
+    let counters = *unit.port.counters();
+    assert_eq!((counters.communication_errors, counters.gaps), (0, 0));
     unit.characters(&noise);
     unit.port.long_silence(0);
     assert_eq!(unit.port.counters().communication_errors, 1);

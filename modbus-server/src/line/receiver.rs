@@ -375,13 +375,9 @@ impl<'a, U: Units> Receiver<'a, U> {
             self.begin();
         }
         if self.state & PAUSED != 0 {
-            count(&mut self.counters.gaps);
             self.state &= !PAUSED;
-            if self.units.is_fast() {
-                self.state |= SEEKS;
-            }
-            if self.strict_t15 {
-                self.state |= TORN;
+            if self.state & (FOLLOWS | QUIET) == 0 {
+                self.note_gap();
             }
         }
         self.note(faults);
@@ -389,6 +385,17 @@ impl<'a, U: Units> Receiver<'a, U> {
         self.keep_or_follow(byte);
         if U::FAST && self.state & (FOLLOWS | SEEKS) != 0 {
             self.seek_reply();
+        }
+    }
+
+    /// Counts a gap longer than t1.5 in an RTU frame.
+    fn note_gap(&mut self) {
+        count(&mut self.counters.gaps);
+        if self.units.is_fast() {
+            self.state |= SEEKS;
+        }
+        if self.strict_t15 {
+            self.state |= TORN;
         }
     }
 
