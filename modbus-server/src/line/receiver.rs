@@ -375,10 +375,7 @@ impl<'a, U: Units> Receiver<'a, U> {
             self.begin();
         }
         if self.state & PAUSED != 0 {
-            self.state &= !PAUSED;
-            if self.state & (FOLLOWS | QUIET) == 0 {
-                self.note_gap();
-            }
+            self.note_gap();
         }
         self.note(faults);
         self.check = crc::step(self.check, byte);
@@ -388,14 +385,17 @@ impl<'a, U: Units> Receiver<'a, U> {
         }
     }
 
-    /// Counts a gap longer than t1.5 in an RTU frame.
+    /// Notes a gap longer than t1.5 in an RTU frame. An arbitration has such gaps, which do not count.
     fn note_gap(&mut self) {
-        count(&mut self.counters.gaps);
+        self.state &= !PAUSED;
         if self.units.is_fast() {
             self.state |= SEEKS;
         }
-        if self.strict_t15 {
-            self.state |= TORN;
+        if self.state & (FOLLOWS | QUIET) == 0 {
+            count(&mut self.counters.gaps);
+            if self.strict_t15 {
+                self.state |= TORN;
+            }
         }
     }
 
