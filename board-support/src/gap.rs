@@ -61,9 +61,7 @@ impl LimitTicks {
             ticks: cycles.div_ceil(divider) as u16,
         }
     }
-}
 
-impl LimitTicks {
     const fn cycles(self) -> u32 {
         self.prescaler as u32 + 1
     }

@@ -161,19 +161,17 @@ impl Served {
             (self.server.serve(request, &mut **device), delay_ms)
         });
         let (outcome, writes) = (reply.outcome(), reply.writes());
-        match self.line {
-            LineName::Rs485 if unit.is_some() => {
-                if let Some(unit) = unit {
-                    unit.close(&mut reply);
-                }
+        match (self.line, unit) {
+            (LineName::Rs485, Some(unit)) => {
+                unit.close(&mut reply);
                 let contest = Contest::default();
                 rs485.lock(|line| line.as_mut().map(|line| line.arbitrate(reply, contest)));
             }
-            LineName::Rs485 => {
+            (LineName::Rs485, None) => {
                 let delay_ms = if self.at_once { 0 } else { delay_ms };
                 rs485.lock(|line| line.as_mut().map(|line| line.send(reply, delay_ms)));
             }
-            LineName::Radio => {
+            (LineName::Radio, _) => {
                 radio.lock(|line| line.as_mut().map(|line| line.send_reply(reply)));
             }
         }

@@ -109,10 +109,10 @@ pub fn up(
     } else {
         0
     };
-    let is_rtu = settings.mode == Mode::Rtu && HAS_EVENTS;
+    let is_fast = settings.mode == Mode::Rtu && HAS_EVENTS;
     let identity = Identity {
         serial_number,
-        reports_events: is_rtu && matches!(address, Address::Unit(_)),
+        reports_events: is_fast && matches!(address, Address::Unit(_)),
         unit: address.unit().unwrap_or_default(),
         reset_cause: board.reset_cause,
         unique_id: board.unique_id,
@@ -157,7 +157,7 @@ pub fn up(
     let t35 = settings
         .frame_gap
         .map_or(gaps.t35, |tenths| gaps.frame_gap(tenths));
-    let line = line::units(address.unit(), is_rtu).and_then(|units| {
+    let line = line::units(address.unit(), is_fast).and_then(|units| {
         let strict = settings.gap_rule == GapRule::Drop;
         let (receiver, (t15_ns, t35_ns)) = match framing {
             Framing::Rtu => (Receiver::rtu(units, strict), (gaps.t15.min(t35), t35)),

@@ -42,7 +42,7 @@ struct PortEvents {
 }
 
 impl<const SLOTS: usize> Events<SLOTS> {
-    /// Returns nothing but the start of the unit.
+    /// Returns the events of a unit that has just started: only that it has started.
     pub fn new() -> Self {
         Self {
             ports: [PortEvents::default(); SLOTS],

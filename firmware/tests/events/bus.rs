@@ -13,7 +13,7 @@ const LATE_US: f64 = 8.5;
 const CABLE_US: f64 = 6.0;
 /// Largest error of a crystal in ppm.
 const PPM: f64 = 200.0;
-/// Time from the end of a reply to the next request, in us.
+/// Time from the end of a reply to the next request of function 70, in bits.
 const PAUSE_BITS: f64 = 38.5;
 
 pub struct Bus {
@@ -33,7 +33,7 @@ impl Bus {
     pub fn new(baud: u32, count: u8, errors: f64, seed: u64) -> Self {
         let mut rng = StdRng::seed_from_u64(seed);
         let bit = 1e6 / f64::from(baud);
-        // A tick is so long that the longest reply takes 65,536 of them; a fraction is 1/65,536 of it.
+        // The longest reply takes 65,536 ticks, and a fraction is 1/65,536 of a tick.
         let fraction = (256.0 * 11.0 * bit + 1_000.0) / 65_536.0 / 65_536.0;
         let fractions = |us: f64| (us / fraction) as u32;
         let units = (1..=count)
@@ -90,42 +90,43 @@ impl Bus {
         }
     }
 
-    /// Sends a request, and returns what the master gets. `windows`: those of the arbitration; `None` after a usual
-    /// request, which is over when the line has been silent.
-    pub fn ask(&mut self, request: &[u8], windows: Option<u8>) -> Vec<u8> {
+    /// Sends a request, and returns what the master gets. `arbitrates`: it is a fetch; a usual request is over when the
+    /// line has been silent.
+    pub fn ask(&mut self, request: &[u8], arbitrates: bool) -> Vec<u8> {
         self.deliver(request, self.now, None);
         self.now += self.characters(request.len());
         let ended = self.now;
-        let answer = match windows {
-            Some(_) => {
-                for unit in &mut self.units {
-                    unit.serve(ended, self.windows);
-                }
-                self.arbitrate(ended)
+        let answer = if arbitrates {
+            for unit in &mut self.units {
+                unit.serve(ended, self.windows);
             }
-            None => {
-                self.now += self.times.t35;
-                let mut replies = Vec::new();
-                for (n, unit) in self.units.iter_mut().enumerate() {
-                    unit.pass_silence(self.now, self.times);
-                    let reply = unit.serve(self.now, self.windows);
-                    replies.extend(reply.map(|reply| (n, reply)));
-                }
-                assert!(replies.len() <= 1, "two units reply");
-                replies.pop()
+            self.arbitrate(ended)
+        } else {
+            self.now += self.times.t35;
+            let mut replies = Vec::new();
+            for (n, unit) in self.units.iter_mut().enumerate() {
+                unit.pass_silence(self.now, self.times);
+                let reply = unit.serve(self.now, self.windows);
+                replies.extend(reply.map(|reply| (n, reply)));
             }
+            assert!(replies.len() <= 1, "two units reply");
+            replies.pop()
         };
         let Some((sender, reply)) = answer else {
             // A usual master waits for 50 ms, one of function 70 as long as there may be a start bit.
             let length = f64::from(self.windows.length) * self.fraction;
             let wait = 20.0 * self.bit + 800.0 + 9.0 * length;
-            self.now = ended + windows.map_or(50_000.0, |_| wait);
+            self.now = ended + if arbitrates { wait } else { 50_000.0 };
             return Vec::new();
         };
         self.deliver(&reply, self.now, Some(sender));
         self.now += self.characters(reply.len());
         let bytes = self.received(&reply);
-        self.now += windows.map_or(self.times.t35, |_| PAUSE_BITS * self.bit);
+        self.now += if arbitrates {
+            PAUSE_BITS * self.bit
+        } else {
+            self.times.t35
+        };
         bytes
     }
 
@@ -190,7 +191,7 @@ impl Bus {
 }
 
 /// Returns 0, the limit, or a value between them, because the worst is often at the ends.
-pub fn extreme(rng: &mut StdRng, limit: f64) -> f64 {
+fn extreme(rng: &mut StdRng, limit: f64) -> f64 {
     *[0.0, limit, rng.random_range(0.0..=limit)]
         .choose(rng)
         .unwrap()

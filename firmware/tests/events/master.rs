@@ -65,7 +65,7 @@ impl Master {
         // The unit may be starting, and frames are damaged.
         let mut reply = Vec::new();
         for _ in 0..50 {
-            reply = self.bus.ask(&frame(&request), None);
+            reply = self.bus.ask(&frame(&request), false);
             if reply == expected {
                 self.known[n].states = 0b1111;
                 return;
@@ -78,7 +78,7 @@ impl Master {
     fn fetch(&mut self, latencies: &mut Vec<f64>) -> bool {
         let (address, flag) = self.confirms;
         let request = frame(&[0xFD, 0x46, 0x10, 0, 100, address, flag]);
-        let reply = self.bus.ask(&request, Some(12));
+        let reply = self.bus.ask(&request, true);
         let Some(body) = body(&reply) else {
             return true;
         };

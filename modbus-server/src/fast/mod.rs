@@ -16,8 +16,8 @@
 //! A line with a [`FastUnit`](crate::line::FastUnit) recognises these messages at their last byte
 //! ([`Port::ends_fast_message`](crate::line::Port::ends_fast_message)), because units begin to arbitrate, and masters to
 //! send the next request, before t3.5 has passed. A request to a serial number is opened by [`Unit::open`] and then served
-//! as any other; [`Server::serve_fast`](crate::Server::serve_fast) serves the other ones for a [`Unit`], and [`Port::arbitrate`](crate::line::Port::arbitrate) takes the
-//! reply. Sub-function 18 has the unit's own address: a data model serves it as a user-defined function, with
+//! as any other; [`Server::serve_fast`](crate::Server::serve_fast) serves the other ones for a [`Unit`], and
+//! [`Port::arbitrate`](crate::line::Port::arbitrate) takes the reply. Sub-function 18 has the unit's own address: a data model serves it as a user-defined function, with
 //! [`check_settings`] and [`apply_settings`].
 
 mod events;
@@ -47,5 +47,5 @@ pub(crate) mod sub {
     pub const SETTINGS: u8 = 0x18;
 }
 
-/// Length of what stands in front of the PDU of a request to a serial number, less the unit address of a usual frame.
+/// Number of bytes by which a request to a serial number is longer than the same request to a unit address.
 pub(crate) const SERIAL_AHEAD: u8 = 6;

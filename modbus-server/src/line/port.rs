@@ -194,7 +194,8 @@ impl<'a, U: Units> Port<'a, U> {
     }
 
     /// Takes a reply that is sent if its arbitration is won. Call [`fell`](Self::fell) when the line falls, at the latest in
-    /// front of the next turn, and [`turn`](Self::turn) at each [`deadline`](Self::deadline). A frame that has come since the request ends the arbitration.
+    /// front of the next turn, and [`turn`](Self::turn) at each [`deadline`](Self::deadline). A frame that has come since
+    /// the request ends the arbitration.
     pub fn arbitrate(&mut self, reply: Reply<'a>, arbitration: Arbitration) {
         self.won = false;
         let is_late = self.request.is_some() || !self.receiver.is_idle();

@@ -1,14 +1,15 @@
 //! Turns characters and silences into valid requests for this unit.
 
+mod fast;
+
 use super::ascii::{self, Part, Reader, Width};
-use super::messages::{Message, begins_reply};
 use super::state::{
     ASCII, ASCII_ENDED, ASCII_IDLE, DEAF, FOLLOWS, IDLE, NOT_ENDED, OVERRUN, PAUSED, QUIET, RTU,
     SEEKS, SPOILED, TORN, UNKEPT,
 };
 use super::{Faults, Framing, Units, length};
 use crate::counters::count;
-use crate::{Adu, BROADCAST, LineCounters, crc, fast};
+use crate::{Adu, BROADCAST, LineCounters, crc};
 
 /// The receiving half of a line (V1.02 2.5.1.1, figure 14, for RTU; 2.5.2.1, figure 17, for ASCII).
 ///
@@ -133,12 +134,6 @@ impl<'a, U: Units> Receiver<'a, U> {
         U::FAST && check == crc::GOOD && self.is_for_fast()
     }
 
-    /// Returns whether the frame so far has the function code of Fast Modbus.
-    #[inline(always)]
-    fn is_for_fast(&self) -> bool {
-        (self.filling.as_ref()).is_some_and(|adu| adu.get(1) == fast::FUNCTION)
-    }
-
     /// Notes that 1.5 characters of silence have passed, in RTU mode. Has no effect in ASCII mode.
     #[inline]
     pub const fn pause(&mut self) {
@@ -169,14 +164,6 @@ impl<'a, U: Units> Receiver<'a, U> {
         self.filling.as_ref().is_some_and(|adu| {
             length::is_request(adu, 0) || (!self.takes(adu.get(0)) && length::is_reply(adu, 0))
         })
-    }
-
-    /// Returns whether the RTU frame so far is a whole message of Fast Modbus between a master and all units: it has a
-    /// valid CRC and the length that its sub-function requires. It ends without a silence: [`close`](Self::close) it.
-    pub fn is_fast_message(&self) -> bool {
-        self.check == crc::GOOD
-            && self.state & !(FOLLOWS | QUIET | SEEKS) == 0
-            && (self.filling.as_ref()).is_some_and(|adu| Message::of(adu).is_some())
     }
 
     /// Returns whether the frame so far can never become valid: it is damaged or too long, or its beginning was missed.
@@ -231,51 +218,6 @@ impl<'a, U: Units> Receiver<'a, U> {
         if self.filling.is_none() {
             self.state |= UNKEPT;
             self.unkept = 0;
-        }
-    }
-
-    /// Returns whether a valid RTU frame is a reply of Fast Modbus, and notes what follows it.
-    #[inline(never)]
-    fn is_fast_reply(&mut self) -> bool {
-        if !self.units.is_fast() {
-            return false;
-        }
-        let frame = self.filling.as_ref();
-        let message = frame.and_then(|adu| Message::of(adu));
-        self.state |= match message {
-            Some(Message::Request) => FOLLOWS,
-            Some(Message::Reply) => QUIET,
-            None => 0,
-        };
-        message == Some(Message::Reply)
-    }
-
-    /// The unit itself sends the reply of Fast Modbus.
-    pub(super) const fn end_following(&mut self) {
-        self.state = self.state & !FOLLOWS | QUIET;
-    }
-
-    /// Drops what is in front of the reply of Fast Modbus that the last three characters begin, if they do. While units
-    /// arbitrate, several start bits can overlap, so that these characters need not be FF.
-    fn seek_reply(&mut self) {
-        let Some(adu) = &mut self.filling else {
-            return;
-        };
-        let Some(at) = adu.len().checked_sub(3) else {
-            return;
-        };
-        // Below 256.
-        let at = at as u8;
-        if begins_reply(adu.get(at), adu.get(at + 1), adu.get(at + 2)) {
-            adu.clear();
-            self.check = crc::START;
-            self.state &= FOLLOWS | SEEKS;
-            // No byte is overwritten before it is read.
-            for n in 0..3 {
-                let byte = adu.get(at + n);
-                self.check = crc::step(self.check, byte);
-                adu.push(byte);
-            }
         }
     }
 
@@ -382,20 +324,6 @@ impl<'a, U: Units> Receiver<'a, U> {
         self.keep_or_follow(byte);
         if U::FAST && self.state & (FOLLOWS | SEEKS) != 0 {
             self.seek_reply();
-        }
-    }
-
-    /// Notes a gap longer than t1.5 in an RTU frame. An arbitration has such gaps, which do not count.
-    fn note_gap(&mut self) {
-        self.state &= !PAUSED;
-        if self.units.is_fast() {
-            self.state |= SEEKS;
-        }
-        if self.state & (FOLLOWS | QUIET) == 0 {
-            count(&mut self.counters.gaps);
-            if self.strict_t15 {
-                self.state |= TORN;
-            }
         }
     }
 
