@@ -5,14 +5,13 @@
 
 use board_support::{Flash, flash::FlashError, kept};
 use firmware::{
-    config::Settings,
     device::Restart,
     store::{Operation, Saving, Store, WriteError},
 };
 use rtic::Mutex;
 
 use crate::{
-    board::{BOARD, Device},
+    board::{BOARD, Device, Settings},
     log::Event,
 };
 

@@ -19,6 +19,7 @@ mod comm_watchdog;
 mod description;
 mod edge_log;
 mod identification;
+mod linking;
 mod points;
 mod port;
 mod state;
@@ -59,6 +60,10 @@ pub struct Device<const SLOTS: usize> {
     description: Description,
     comm_watchdog: CommWatchdog,
     edges: EdgeLog,
+    /// The levels of the sources of the links of each slot, one bit for each link.
+    levels: [u8; SLOTS],
+    /// The levels are those of a scan. From then on a change is an edge.
+    linked: bool,
     /// A command from a request, to be executed when its reply has been sent.
     ordered: Option<Command>,
     /// The device is to restart once no save is under way.
@@ -109,7 +114,7 @@ impl Block {
     #[inline(never)]
     const fn of_others(span: Span) -> Self {
         match span.start().to_be_bytes() {
-            [1, _] => Self::Config,
+            [1 | 4, _] => Self::Config,
             [2, 0x00..=0x5F] => Self::State,
             [2, 0x60..=0x6F] => Self::Fault,
             [2, _] => Self::Radio,
@@ -132,6 +137,8 @@ impl<const SLOTS: usize> Device<SLOTS> {
             description: Description::new(description, &config),
             comm_watchdog: CommWatchdog::new(),
             edges: EdgeLog::new(),
+            levels: [0; SLOTS],
+            linked: false,
             ordered: None,
             restart: None,
             update: None,
@@ -151,6 +158,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
         self.config.compare();
         self.revision = self.config.revision();
         self.for_each_point(IoPort::configure);
+        self.update_links(false);
     }
 
     /// Passes the settings in force of every point to `act`, with the point's port and channel.
@@ -183,7 +191,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
 
     /// Stores the inputs that a scan of a slot has read. `words` is false when the settings have changed since the scan
     /// began: then the words of the scan have the wrong unit. `late`: the scan before this one was some milliseconds ago,
-    /// because flash was erased.
+    /// because flash was erased. Call [`Self::run_links`] after the last slot.
     pub fn scanned(&mut self, slot: usize, channels: &Channels, words: bool, late: bool) {
         // 0 stands for an input without an edge.
         let now = self.state.millis().max(1);
@@ -194,17 +202,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
         let Some(port) = self.points.ports_mut().get_mut(slot) else {
             return;
         };
-        let edges = port.scanned(channels, words, now);
-        if edges == 0 {
-            return;
-        }
-        for (channel, settings) in port.settings().iter().enumerate() {
-            if edges >> channel & 1 != 0 {
-                let point = first.wrapping_add(channel as u16);
-                self.edges
-                    .add(point, channels.bit(channel), now, settings.filter);
-            }
-        }
+        port.scanned(channels, words, now, first, &mut self.edges);
     }
 
     /// Restarts the communication watchdog, unless COMM_SOURCE excludes the request: a valid request for this unit ended
@@ -316,8 +314,11 @@ impl<const SLOTS: usize> Device<SLOTS> {
             )
     }
 
-    fn state_word(&self, address: u16) -> u16 {
+    /// Returns a register of state, fault record, pulse counters or last edges.
+    fn read_only_word(&self, address: u16) -> u16 {
         match address {
+            counters::PULSES.. => self.points.input_word(address),
+            fault::KIND..radio::BUS_MESSAGES => self.state.fault_word(address),
             state_map::STATUS => self.status(),
             state_map::UPDATE => self.update.as_ref().map_or(0, Update::register),
             state_map::DESCRIPTION_CRC => self.description.crc(),
@@ -405,15 +406,9 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
         match Block::of(span) {
             Block::Points => self.points.read_words(span, out),
             Block::Config => self.config.read(span, out),
-            Block::State | Block::Radio => span
+            Block::State | Block::Radio | Block::Fault | Block::Pulses | Block::Edges => span
                 .addresses()
-                .for_each(|address| out.push(self.state_word(address))),
-            Block::Fault => span
-                .addresses()
-                .for_each(|address| out.push(self.state.fault_word(address))),
-            Block::Pulses | Block::Edges => span
-                .addresses()
-                .for_each(|address| out.push(self.points.input_word(address))),
+                .for_each(|address| out.push(self.read_only_word(address))),
         }
     }
 
@@ -452,15 +447,14 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
     }
 
     fn read_file(&self, file: u16, records: Span, out: &mut WordsOut<'_>) {
-        if file == status::FILE
-            && let Some(update) = &self.update
-        {
-            let records = records.addresses();
-            return records.for_each(|record| out.push(update.record(record)));
-        }
-        if file == edges::log::FILE {
-            let records = records.addresses();
-            return records.for_each(|record| out.push(self.edges.record(record)));
+        let update = self.update.as_ref().filter(|_| file == status::FILE);
+        if file == edges::log::FILE || update.is_some() {
+            return records.addresses().for_each(|record| {
+                out.push(
+                    update
+                        .map_or_else(|| self.edges.record(record), |update| update.record(record)),
+                );
+            });
         }
         self.description.read(&self.config, records, out);
     }
