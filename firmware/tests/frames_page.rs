@@ -44,6 +44,7 @@ impl Unit {
         };
         let fixed = const { &Fixed::of(&MODIO_02) };
         let mut device = Device::new(Config::new(&MODIO_02, settings, false), identity, fixed);
+        device.start();
 
         let mut inputs = Channels::new();
         if line.contains("Inputs 1 and 3 are energised") {

@@ -111,6 +111,7 @@ pub fn up(
         build: build(board.development),
     };
     let device = place.write(Device::new(config, identity, DESCRIPTION));
+    device.start();
     let updating = Updating::new(&mut pages, board.crc);
     device.update = updating.update(&mut pages, board.chosen);
     for (slot, port) in device.points.ports_mut().iter_mut().enumerate() {

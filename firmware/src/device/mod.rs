@@ -127,11 +127,12 @@ impl Block {
 
 impl<const SLOTS: usize> Device<SLOTS> {
     /// Creates a device with these settings, whose slots have channels of these kinds, in the order of the ports.
-    /// The outputs are set to START. `description` is that of the board.
+    /// `description` is that of the board. [`Self::start`] must follow: it works in place, because a device is too large to
+    /// be on the stack more than once.
     #[must_use]
     #[inline(never)]
     pub fn new(config: Config<SLOTS>, identity: Identity, description: &'static Fixed) -> Self {
-        let mut device = Self {
+        Self {
             points: Points::new(config.board().points().start, config.modules()),
             state: State::new(config.board(), identity),
             description: Description::new(description, &config),
@@ -146,10 +147,13 @@ impl<const SLOTS: usize> Device<SLOTS> {
             activity: false,
             revision: config.revision(),
             config,
-        };
-        device.configure_points();
-        device.for_each_point(|port, channel, point| port.command_raw(channel, point.start));
-        device
+        }
+    }
+
+    /// Applies the settings to the points, and sets the outputs to START.
+    pub fn start(&mut self) {
+        self.configure_points();
+        self.for_each_point(|port, channel, point| port.command_raw(channel, point.start));
     }
 
     /// Applies the settings in force to the points, after the settings may have changed.

@@ -49,16 +49,15 @@ impl<const SLOTS: usize> Bench<SLOTS> {
             internal_oscillator: false,
             build: 0,
         };
+        let description = if *board == MODIO_02 {
+            const { &Fixed::of(&MODIO_02) }
+        } else {
+            const { &Fixed::of(&MODIO_08) }
+        };
+        let mut device = Device::new(Config::new(board, settings, false), identity, description);
+        device.start();
         Self {
-            device: Device::new(
-                Config::new(board, settings, false),
-                identity,
-                if *board == MODIO_02 {
-                    const { &Fixed::of(&MODIO_02) }
-                } else {
-                    const { &Fixed::of(&MODIO_08) }
-                },
-            ),
+            device,
             server: Server::new(Framing::Rtu),
         }
     }
