@@ -38,13 +38,13 @@ impl Link {
 
     /// Returns the point of the input, if there is one.
     #[must_use]
-    pub fn source(self) -> Option<u16> {
+    pub fn source(&self) -> Option<u16> {
         Some(self.0[0]).filter(|source| *source != NO_SOURCE)
     }
 
     /// Returns the register at this address.
     #[must_use]
-    pub const fn word(self, address: u16) -> u16 {
+    pub const fn word(&self, address: u16) -> u16 {
         self.0[(address % WORDS) as usize]
     }
 
@@ -54,45 +54,40 @@ impl Link {
     }
 
     /// Returns the action without WHEN.
-    fn action(self) -> LinkAction {
+    fn action(&self) -> LinkAction {
         LinkAction::from_code(self.0[1] & 0xFF).unwrap_or(LinkAction::None)
     }
 
     /// Returns LOW and HIGH of an analog input. Words above 0x7FFF are below 0: only temperatures have them.
-    const fn thresholds(self) -> [i16; 2] {
+    const fn thresholds(&self) -> [i16; 2] {
         [self.0[3].cast_signed(), self.0[2].cast_signed()]
     }
 
     /// Returns whether the registers are consistent for a source of this kind; [`Kind::None`] when SOURCE is not a point of
     /// the unit.
     #[must_use]
-    pub fn suits(self, source: Kind) -> bool {
-        let known = LinkAction::from_code(self.0[1]).is_some();
+    pub fn suits(&self, source: Kind) -> bool {
+        // WHEN is 0 or 1.
+        let action = self.0[1] & !LinkAction::NoneAlone.code();
         let [low, high] = self.thresholds();
-        let action = self.action();
-        let fits = match source {
-            Kind::BitInput => true,
-            Kind::WordInput => {
-                low <= high
-                    && matches!(
-                        action,
-                        LinkAction::None | LinkAction::Follow | LinkAction::Invert
-                    )
-            }
-            Kind::None | Kind::BitOutput | Kind::WordOutput => self.0[0] == NO_SOURCE,
+        let last = match source {
+            Kind::BitInput => LinkAction::Reset,
+            Kind::WordInput if low <= high => LinkAction::Invert,
+            _ if self.source().is_none() => LinkAction::Reset,
+            _ => return false,
         };
-        known && fits && (action != LinkAction::Pulse || self.0[2] > 0)
+        action <= last.code() && (action != LinkAction::Pulse.code() || self.0[2] > 0)
     }
 
     /// Returns whether the link acts. `alone`: the communication watchdog has expired.
     #[must_use]
-    pub const fn is_awake(self, alone: bool) -> bool {
+    pub const fn is_awake(&self, alone: bool) -> bool {
         self.0[1] >> 8 == 0 || alone
     }
 
     /// Returns the level of an analog input with this word. `before` is its level before.
     #[must_use]
-    pub fn level_of(self, word: u16, before: bool) -> bool {
+    pub fn level_of(&self, word: u16, before: bool) -> bool {
         let [low, high] = self.thresholds();
         let word = word.cast_signed();
         word > high || before && word >= low
@@ -101,7 +96,7 @@ impl Link {
     /// Returns what the link does when the level of its input has changed. `output` is the value of the output, `other`
     /// whether its other link wants it on.
     #[must_use]
-    pub fn at_edge(self, level: bool, output: bool, other: bool) -> Option<Act> {
+    pub fn at_edge(&self, level: bool, output: bool, other: bool) -> Option<Act> {
         let mut pulse_ms = 0;
         let value = match self.action() {
             LinkAction::Follow | LinkAction::Invert => self.wants(level) || other,
@@ -119,7 +114,7 @@ impl Link {
 
     /// Returns whether a link that follows its input wants the output on, for this level of the input.
     #[must_use]
-    pub fn wants(self, level: bool) -> bool {
+    pub fn wants(&self, level: bool) -> bool {
         match self.action() {
             LinkAction::Follow => level,
             LinkAction::Invert => !level,

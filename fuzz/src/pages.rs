@@ -85,7 +85,7 @@ impl Found {
     #[must_use]
     pub fn good(settings: &Settings) -> Self {
         Self {
-            settings: settings.clone(),
+            settings: *settings,
             invalid: false,
             rejected: 0,
         }

@@ -13,13 +13,13 @@
 //!           6 save of two settings  4 bytes    7 save of what is stored
 //! ```
 
-use firmware::store::{Loaded, Page, Store, WriteError};
+use firmware::store::{Page, Store, WriteError};
 use register_map::board::MODIO_02;
 
 use crate::PAGE_SIZE;
 use crate::flash::{Fault, Mess, MockFlash};
 use crate::pages::{self, Found};
-use crate::running::{Settings, fullest_settings, random_settings, save};
+use crate::running::{Loaded, Settings, fullest_settings, random_settings, save};
 use crate::script::Script;
 
 /// Enough events to fill both pages several times.
@@ -94,7 +94,7 @@ impl Life {
             }
             _ => {
                 self.start();
-                let stored = self.expected[0].settings.clone();
+                let stored = self.expected[0].settings;
                 self.save(&stored);
             }
         }

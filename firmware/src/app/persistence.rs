@@ -88,7 +88,7 @@ impl Persistence {
     fn save(&mut self, device: &mut impl Mutex<T = &'static mut Device>) -> Option<Event> {
         // A copy, so that requests do not wait while the settings are encoded. They stay the same until the end of
         // the save.
-        let settings = device.lock(|device| device.config.to_save().clone());
+        let settings = device.lock(|device| *device.config.to_save());
         let mut saving = match self.saving.take() {
             Some(saving) => saving,
             None => {

@@ -9,7 +9,7 @@ use super::settings::{Settings, differences};
 use crate::links::{Link, OF_A_SLOT};
 
 /// The links of the points of a board with `SLOTS` slots.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Links<const SLOTS: usize> {
     /// The board's first point.
     first: u16,
@@ -31,9 +31,9 @@ impl<const SLOTS: usize> Links<SLOTS> {
     }
 
     /// Returns a link of a slot.
-    pub fn link(&self, slot: usize, index: usize) -> Link {
+    pub fn link(&self, slot: usize, index: usize) -> &Link {
         let link = self.slots.get(slot).and_then(|slot| slot.get(index));
-        link.copied().unwrap_or(Link::NONE)
+        link.unwrap_or(const { &Link::NONE })
     }
 
     /// Returns a link of a slot, to be changed.
@@ -51,7 +51,7 @@ impl<const SLOTS: usize> Links<SLOTS> {
     }
 
     /// Returns the link of a register, if the board has it.
-    pub fn at(&self, address: u16) -> Option<Link> {
+    pub fn at(&self, address: u16) -> Option<&Link> {
         let (slot, index) = self.place(address)?;
         Some(self.link(slot, index))
     }
@@ -86,7 +86,7 @@ impl<const SLOTS: usize> Settings<SLOTS> {
     }
 
     /// Returns whether the chosen modules allow a link.
-    fn allows(&self, link: Link) -> bool {
+    fn allows(&self, link: &Link) -> bool {
         link.suits(link.source().map_or(Kind::None, |source| self.kind(source)))
     }
 
@@ -134,7 +134,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
         // The first register of each link that is written.
         let first = |address: &u16| *address == span.start() || address.is_multiple_of(WORDS);
         span.addresses().filter(first).all(|address| {
-            let Some(mut link) = self.edited.links.at(address) else {
+            let Some(mut link) = self.edited.links.at(address).copied() else {
                 return false;
             };
             for (word, address) in link.0.iter_mut().zip(address / WORDS * WORDS..) {
@@ -142,13 +142,13 @@ impl<const SLOTS: usize> Config<SLOTS> {
                     *word = written;
                 }
             }
-            self.edited.allows(link)
+            self.edited.allows(&link)
         })
     }
 
     /// Returns a link that is in force: until the restart one from or to a port whose MODULE has changed is not.
     #[must_use]
-    pub fn link(&self, slot: usize, index: usize) -> Link {
+    pub fn link(&self, slot: usize, index: usize) -> &Link {
         let link = self.edited.links.link(slot, index);
         let from = link
             .source()
@@ -156,7 +156,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
         if self.is_in_force(slot) && self.is_in_force(from) {
             link
         } else {
-            Link::NONE
+            const { &Link::NONE }
         }
     }
 }

@@ -106,7 +106,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
             modules: array::from_fn(|slot| {
                 stored.module(board.first_port.wrapping_add(slot as u16))
             }),
-            edited: stored.clone(),
+            edited: stored,
             saved: stored,
             differences: 0,
             save: Save::None,
@@ -351,7 +351,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
 
     /// COMMAND 4: sets every setting to its saved value.
     pub fn drop_changes(&mut self) {
-        self.edited.clone_from(&self.saved);
+        self.edited = self.saved;
         self.left = 0;
         self.revision = self.revision.wrapping_add(1);
     }
@@ -360,7 +360,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
     /// returns the copy until [`Self::end_save`] or [`Self::save_failed`].
     pub fn begin_save(&mut self) {
         self.save = Save::Begun;
-        self.saved.clone_from(&self.edited);
+        self.saved = self.edited;
         self.differences = 0;
     }
 

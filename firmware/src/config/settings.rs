@@ -19,7 +19,8 @@ pub struct RestartValues(pub(super) [u16; RESTARTS]);
 
 /// A value for every register of the configuration, and the links of the points in `SLOTS` slots. The values are
 /// consistent: a setting by point is always one that the point's module allows, and so is a link.
-#[derive(Clone, Debug, PartialEq, Eq)]
+// `Copy`, because copies of its parts one after another take more flash.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings<const SLOTS: usize> {
     /// Indexed by the low byte of the address. KEY, COMMAND and gaps hold 0.
     values: [u16; 256],

@@ -47,7 +47,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
     }
 
     /// Returns the level of the source of a link. `before` is its level before, which a link without source keeps.
-    fn level_of(&self, link: Link, before: bool) -> bool {
+    fn level_of(&self, link: &Link, before: bool) -> bool {
         let source = link.source().and_then(|point| self.points.place_of(point));
         match source.map(|(port, channel)| (port.kind(channel), port.channels(), channel)) {
             Some((Kind::BitInput, channels, channel)) => channels.bit(channel),

@@ -93,12 +93,13 @@ pub enum Restart {
 enum Block {
     Points,
     Config,
-    State,
-    Fault,
-    Radio,
     Pulses,
-    Edges,
+    /// State, fault record, counters of the radio, last edges.
+    ReadOnly,
 }
+
+/// The registers of [`Block::ReadOnly`]. A span lies within one of these ranges.
+const READ_ONLY: [&[Range<u16>]; 4] = [state_map::SPANS, fault::SPANS, radio::SPANS, edges::SPANS];
 
 impl Block {
     #[inline(always)]
@@ -115,11 +116,8 @@ impl Block {
     const fn of_others(span: Span) -> Self {
         match span.start().to_be_bytes() {
             [1 | 4, _] => Self::Config,
-            [2, 0x00..=0x5F] => Self::State,
-            [2, 0x60..=0x6F] => Self::Fault,
-            [2, _] => Self::Radio,
-            [3, 0x00..=0x7F] => Self::Pulses,
-            [3, _] => Self::Edges,
+            [2, _] | [3, 0x80..=0xFF] => Self::ReadOnly,
+            [3, _] => Self::Pulses,
             _ => Self::Points,
         }
     }
@@ -318,7 +316,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
             )
     }
 
-    /// Returns a register of state, fault record, pulse counters or last edges.
+    /// Returns a register of [`Block::ReadOnly`] or of the pulse counters.
     fn read_only_word(&self, address: u16) -> u16 {
         match address {
             counters::PULSES.. => self.points.input_word(address),
@@ -336,11 +334,11 @@ const fn is_of_update(command: &Command) -> bool {
     command.code() >= Command::Prepare.code()
 }
 
-/// Checks whether a span lies in a block of read-only registers and contains no gap.
-fn check_exists(block: &[Range<u16>], span: Span) -> Result<(), Exception> {
+/// Checks whether a span lies in one of these ranges of registers.
+fn check_exists(blocks: &[&[Range<u16>]], span: Span) -> Result<(), Exception> {
     let within =
         |range: &Range<u16>| range.contains(&span.start()) && span.end() <= u32::from(range.end);
-    if block.iter().any(within) {
+    if blocks.iter().any(|block| block.iter().any(within)) {
         Ok(())
     } else {
         Err(Exception::IllegalDataAddress)
@@ -357,11 +355,8 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
         match Block::of(span) {
             Block::Points => self.points.check_read_words(span),
             Block::Config => self.config.check_read(span),
-            Block::State => check_exists(state_map::SPANS, span),
-            Block::Fault => check_exists(fault::SPANS, span),
-            Block::Radio => check_exists(radio::SPANS, span),
-            Block::Pulses => check_exists(counters::SPANS, span),
-            Block::Edges => check_exists(edges::SPANS, span),
+            Block::Pulses => check_exists(&[counters::SPANS], span),
+            Block::ReadOnly => check_exists(&READ_ONLY, span),
         }
     }
 
@@ -380,11 +375,9 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
                 }
                 checked
             }
-            Block::State | Block::Fault | Block::Radio | Block::Edges => {
-                Err(Exception::IllegalDataAddress)
-            }
+            Block::ReadOnly => Err(Exception::IllegalDataAddress),
             Block::Pulses => {
-                check_exists(counters::SPANS, span)?;
+                check_exists(&[counters::SPANS], span)?;
                 points::check_clear(span, words)?;
                 self.config.check_line()
             }
@@ -410,7 +403,7 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
         match Block::of(span) {
             Block::Points => self.points.read_words(span, out),
             Block::Config => self.config.read(span, out),
-            Block::State | Block::Radio | Block::Fault | Block::Pulses | Block::Edges => span
+            Block::Pulses | Block::ReadOnly => span
                 .addresses()
                 .for_each(|address| out.push(self.read_only_word(address))),
         }
@@ -427,8 +420,8 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
                 self.ordered = self.config.write(span, words);
             }
             Block::Pulses => self.points.clear_pulses(span),
-            // `check_write_words` rejects writes to these blocks.
-            Block::State | Block::Fault | Block::Radio | Block::Edges => {}
+            // `check_write_words` rejects writes to these registers.
+            Block::ReadOnly => {}
         }
     }
 

@@ -41,7 +41,7 @@ fn live(flash: MockFlash, first: &Settings, life: &[Event]) -> Vec<Place> {
     let mut places = Vec::new();
     let mut note = |flash: &mut MockFlash, old: &Settings, new: &Settings| {
         for (before, operation) in flash.journal.replace(Vec::new()).unwrap_or_default() {
-            let (old, new) = (old.clone(), new.clone());
+            let (old, new) = (*old, *new);
             places.push(Place {
                 before,
                 operation,
@@ -51,7 +51,7 @@ fn live(flash: MockFlash, first: &Settings, life: &[Event]) -> Vec<Place> {
         }
     };
     flash.journal = Some(Vec::new());
-    let mut stored = first.clone();
+    let mut stored = *first;
     let (loaded, mut store) = start_well(&mut flash);
     assert_eq!(loaded.settings, stored);
     note(&mut flash, &stored, &stored);
@@ -60,7 +60,7 @@ fn live(flash: MockFlash, first: &Settings, life: &[Event]) -> Vec<Place> {
             Save(settings) => {
                 save(&mut store, &mut flash, settings).unwrap();
                 note(&mut flash, &stored, settings);
-                stored = Settings::clone(settings);
+                stored = **settings;
             }
             Spare => {
                 store.make_spare(&mut flash).unwrap();
@@ -241,8 +241,8 @@ fn cut_in_the_start_after_a_cut_is_recovered() {
                 let second = Place {
                     before,
                     operation,
-                    old: place.old.clone(),
-                    new: place.new.clone(),
+                    old: place.old,
+                    new: place.new,
                 };
                 cut_and_recover(&second, MESSES[(index + 3) % MESSES.len()]);
             }
@@ -259,7 +259,7 @@ fn cut_in_a_half_word_that_then_reads_as_erased_only_at_the_start_is_recovered()
     let places = live(
         MockFlash::erased(),
         &Settings::defaults(&MODIO_02),
-        &[Save(Box::new(old.clone())), Save(Box::new(new.clone()))],
+        &[Save(Box::new(old)), Save(Box::new(new))],
     );
     let first = places.iter().find(|place| place.old == old).unwrap();
     let mut refused = 0;

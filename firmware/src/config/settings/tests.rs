@@ -133,7 +133,7 @@ fn settings_made_before_the_module_are_kept_if_it_allows_them() {
     settings.set(SAFE + SLOT + 1, HOLD);
     settings.set(FILTER + SLOT, 3);
     settings.set(FILTER + SLOT + 1, 100);
-    let mut outputs = settings.clone();
+    let mut outputs = settings;
     outputs.set(MODULE_SLOT, 2);
     assert_eq!(outputs.get(SAFE + SLOT), 0, "2048 is not allowed for a bit");
     assert_eq!(outputs.get(SAFE + SLOT + 1), HOLD);

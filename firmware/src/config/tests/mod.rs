@@ -241,7 +241,7 @@ fn settings_take_effect_immediately_or_after_the_restart() {
     assert_eq!((points[2].safe, points[3].safe), (None, Some(7)));
 
     save(&mut config);
-    let restarted = Config::new(&MODIO_02, config.to_save().clone(), false);
+    let restarted = Config::new(&MODIO_02, *config.to_save(), false);
     let line = LineConfig::of(&restarted.edited);
     assert_eq!(
         (line.baud, line.format, line.frame_gap),
