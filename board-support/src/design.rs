@@ -89,6 +89,9 @@ pub const DIP_POLLS: u32 = 50;
 /// Rate of the scan, in Hz.
 pub const SCAN_HZ: u32 = 1_000;
 
+/// Longest time that an interrupt of the line waits, in us, with a reserve: `cargo xtask bench` measures at most 5.
+pub const LONGEST_WAIT_US: u32 = 10;
+
 /// Time-out of the independent watchdog, in milliseconds with an LSI of 40 kHz. The LSI runs at 30 to 60 kHz
 /// (DS5319 table 25), so the watchdog resets the device after 333 to 667 ms.
 pub const WATCHDOG_MS: u32 = 500;

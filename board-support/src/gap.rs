@@ -12,7 +12,7 @@
 //! A character that has begun by t1.5 or t3.5 raises its flag within one more character time. The decision can be
 //! delayed by that much and no longer.
 
-use crate::uart::LineSettings;
+use crate::uart::{Format, LineSettings};
 
 /// Times on a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,6 +63,80 @@ impl LimitTicks {
     }
 }
 
+impl LimitTicks {
+    const fn cycles(self) -> u32 {
+        self.prescaler as u32 + 1
+    }
+
+    /// Returns the duration of a microsecond in fractions of a tick: 65,536 to a tick.
+    #[must_use]
+    pub const fn us(self, clock_mhz: u8) -> u32 {
+        fractions(clock_mhz as u32, self.cycles())
+    }
+
+    /// Returns the duration of a bit in fractions of a tick.
+    #[must_use]
+    pub const fn bit(self, clock_mhz: u8, baud: u32) -> u32 {
+        fractions(clock_mhz as u32 * 1_000_000, baud * self.cycles())
+    }
+}
+
+/// Returns `n / d` in fractions, rounded down. `d` must be below 2^24. A division of 64-bit numbers would cost 400 bytes
+/// of code.
+const fn fractions(n: u32, d: u32) -> u32 {
+    let d = if d == 0 { 1 } else { d };
+    let rest = (n % d) << 8;
+    let more = (rest % d) << 8;
+    ((n / d) << 16) | ((rest / d) << 8) | (more / d)
+}
+
+/// The bits of a character on the line, to find its last falling edge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CharacterBits {
+    /// All bits, with start, parity and stop bits.
+    count: u8,
+    parity: Parity,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Parity {
+    None,
+    Even,
+    Odd,
+}
+
+impl CharacterBits {
+    /// Returns the bits of a format with eight data bits: others do not arbitrate.
+    #[must_use]
+    pub const fn of(format: Format) -> Self {
+        Self {
+            count: format.bits() as u8,
+            parity: match format {
+                Format::E1 => Parity::Even,
+                Format::O1 => Parity::Odd,
+                _ => Parity::None,
+            },
+        }
+    }
+
+    /// Returns the number of bits from the last falling edge of this character to its end.
+    #[inline]
+    #[must_use]
+    pub const fn after_last_fall(self, character: u8) -> u32 {
+        let is_odd = character.count_ones() & 1;
+        // The highest bit that differs from the one in front of it and is 0; the line is high in front of the start bit.
+        let parity = match self.parity {
+            Parity::None => 1,
+            Parity::Even => is_odd,
+            Parity::Odd => is_odd ^ 1,
+        };
+        let bits = (parity << 9) | ((character as u32) << 1);
+        let falls = !bits & ((bits << 1) | 1) & 0x3FF;
+        // Bit 0 is set, so there is a highest one.
+        (self.count as u32 + falls.leading_zeros()).wrapping_sub(31)
+    }
+}
+
 impl GapTicks {
     /// Returns settings for silences of `t15_ns` and `t35_ns` nanoseconds on a line, with the timer's clock in
     /// whole MHz, up to 128. The prescaler is the smallest with which 16 bits are enough, and every time is rounded
@@ -104,6 +178,28 @@ const fn cycles(clock_mhz: u32, ns: u32) -> u32 {
 mod tests {
     use super::*;
     use crate::uart::Format;
+
+    #[test]
+    fn the_last_falling_edge_of_a_character_is_found() {
+        for (format, character, expected) in [
+            // Only the start bit.
+            (Format::N2, 0xFF, 11),
+            (Format::N2, 0x00, 11),
+            (Format::N1, 0xFF, 10),
+            // Bit 7, eight bits after the start.
+            (Format::N2, 0x7F, 3),
+            (Format::N1, 0x40, 2),
+            (Format::N2, 0x01, 9),
+            // The parity bit.
+            (Format::E1, 0xFF, 2),
+            (Format::O1, 0xFF, 11),
+            (Format::O1, 0xFE, 2),
+            (Format::E1, 0xFE, 11),
+        ] {
+            let bits = CharacterBits::of(format).after_last_fall(character);
+            assert_eq!(bits, expected, "{format:?} {character:02X}");
+        }
+    }
 
     /// Returns the time of a count after the character's end, in nanoseconds.
     fn after_end(ticks: GapTicks, count: u16, line: LineSettings) -> i64 {

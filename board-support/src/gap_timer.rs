@@ -11,7 +11,8 @@
 //! Noise delays a reply by at most one character time, however often it occurs.
 //!
 //! TIM1 also limits the duration of a reply. Its counter runs free, its tick is long enough that the longest reply
-//! takes fewer than 65,536 ticks, and its channel 1 compares.
+//! takes fewer than 65,536 ticks, and its channel 1 compares. The times of an arbitration are counts of the same timer,
+//! because the captured count is the time of an edge; its channel 2 compares for them.
 
 use stm32f1xx_hal::{
     pac,
@@ -20,8 +21,9 @@ use stm32f1xx_hal::{
 
 use crate::{
     ClockSource,
-    gap::{GapTicks, LimitTicks, LineTimes},
-    line::{GapTimer, Silence},
+    design::LONGEST_WAIT_US,
+    gap::{CharacterBits, GapTicks, LimitTicks, LineTimes},
+    line::{Alarms, GapTimer, Silence},
     uart::LineSettings,
 };
 
@@ -31,7 +33,16 @@ pub struct Rs485Timer {
     start_bit: pac::TIM1,
     ticks: GapTicks,
     limit: LimitTicks,
+    bits: CharacterBits,
+    /// Times of an arbitration: a bit, the rest of a character after its flag, and a microsecond.
+    bit: u32,
+    rest: u32,
+    us: u32,
 }
+
+// Flags and enables of TIM1's channels 1 and 2 (RM0008 14.4.4, 14.4.5).
+const LIMIT: u32 = 1 << 1;
+const WAKE: u32 = 1 << 2;
 
 impl Rs485Timer {
     /// Sets the timers up for these times. Returns `None` when TIM2 cannot measure the silences.
@@ -48,14 +59,37 @@ impl Rs485Timer {
         pac::TIM2::reset(rcc);
         pac::TIM1::enable(rcc);
         pac::TIM1::reset(rcc);
+        let mhz = clock.core_mhz();
+        let limit = LimitTicks::new(mhz, times.limit_us);
+        let (bit, us) = (limit.bit(mhz, line.baud), limit.us(mhz));
         let mut gap = Self {
             timer,
             start_bit,
             ticks,
-            limit: LimitTicks::new(clock.core_mhz(), times.limit_us),
+            limit,
+            bits: CharacterBits::of(line.format),
+            bit,
+            rest: bit * line.format.sixteenths_after_flag() / 16,
+            us,
         };
         gap.set_up();
         Some(gap)
+    }
+
+    /// Returns the lengths of a bit and of a microsecond in an arbitration.
+    #[must_use]
+    pub const fn bit_and_us(&self) -> (u32, u32) {
+        (self.bit, self.us)
+    }
+
+    /// Returns the present time of an arbitration.
+    fn now(&self) -> u32 {
+        u32::from(self.start_bit.cnt().read().cnt().bits()) << 16
+    }
+
+    /// Returns the time of the last falling edge.
+    fn last_edge(&self) -> u32 {
+        u32::from(self.start_bit.ccr3().read().ccr().bits()) << 16
     }
 
     fn halt(&mut self) {
@@ -112,7 +146,7 @@ impl GapTimer for Rs485Timer {
         self.stop();
     }
 
-    /// Starts the time limit of a reply that has just begun. [`take_limit`](Self::take_limit) reports when it is
+    /// Starts the time limit of a reply that has just begun. [`take_alarms`](Self::take_alarms) reports when it is
     /// exceeded.
     #[inline]
     fn limit_sending(&mut self) {
@@ -128,21 +162,54 @@ impl GapTimer for Rs485Timer {
         timer.dier().write(|w| w.cc1ie().enabled());
     }
 
-    /// Acknowledges the interrupt of the [limit](Self::limit_sending) and returns whether the limit has been
-    /// reached. The interrupt also occurs when the reply ended in time. Returns false when a newer reply has
-    /// started its own limit.
-    fn take_limit(&mut self) -> bool {
-        const CC1: u32 = 1 << 1;
+    /// The interrupt of the [limit](Self::limit_sending) also occurs when the reply ended in time. Then the limit is not
+    /// reported, if a newer reply has started its own.
+    fn take_alarms(&mut self) -> Alarms {
         let timer = &self.start_bit;
         let flags = timer.sr().read().bits() & timer.dier().read().bits();
         // Clear every flag that is enabled. A disturbed enable bit would otherwise raise this interrupt without end.
-        // SAFETY: writing 0 clears a bit of SR and writing 1 leaves it unchanged (RM0008 14.4.5).
-        timer.sr().write(|w| unsafe { w.bits(!flags) });
-        let reached = flags & CC1 != 0;
-        if reached {
-            timer.dier().modify(|_, w| w.cc1ie().disabled());
+        // SAFETY: writing 0 clears a bit of SR and writing 1 leaves it unchanged (RM0008 14.4.5). Only enables whose
+        // event has come are cleared.
+        unsafe {
+            timer.sr().write(|w| w.bits(!flags));
+            timer
+                .dier()
+                .modify(|r, w| w.bits(r.bits() & !(flags & (LIMIT | WAKE))));
         }
-        reached
+        Alarms {
+            limit: flags & LIMIT != 0,
+            wake: flags & WAKE != 0,
+        }
+    }
+
+    fn fell(&mut self) -> Option<u32> {
+        let fell = self.start_bit.sr().read().cc3if().bit_is_set();
+        // Reading the captured count clears the flag (RM0008 14.4.5).
+        fell.then(|| self.last_edge())
+    }
+
+    /// The interrupt of a character may be late. So its end is calculated from its last falling edge, unless that was
+    /// noise.
+    fn end_of(&self, character: u8) -> u32 {
+        let now = self.now();
+        let after_edge = self.bits.after_last_fall(character) * self.bit;
+        let end = self.last_edge().wrapping_add(after_edge);
+        let latest = now.wrapping_add(self.rest);
+        // The flag is raised up to `rest` before the end.
+        if latest.wrapping_sub(end) <= LONGEST_WAIT_US * self.us {
+            end
+        } else {
+            latest
+        }
+    }
+
+    fn wake_at(&mut self, time: u32) -> bool {
+        let timer = &self.start_bit;
+        timer.ccr2().write(|w| w.ccr().set((time >> 16) as u16));
+        timer.sr().write(|w| w.cc2if().clear_bit());
+        timer.dier().modify(|_, w| w.cc2ie().enabled());
+        // The count may have reached it in front of the flag's clearing.
+        time.wrapping_sub(self.now()).cast_signed() > 0
     }
 
     fn is_running(&self) -> bool {

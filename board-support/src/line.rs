@@ -45,7 +45,9 @@ pub trait Uart {
     fn set_up(&mut self);
 }
 
-/// The timer that measures a line's silences and limits the duration of a reply.
+/// The timer that measures a line's silences, limits the duration of a reply, and has the times of an arbitration.
+///
+/// Such a time is a 16-bit count that wraps, in the high half of a `u32`, with fractions of a tick in the low half.
 pub trait GapTimer {
     /// Restarts the silence: a character was received.
     fn restart(&mut self);
@@ -59,12 +61,29 @@ pub trait GapTimer {
     fn take_event(&mut self) -> Silence;
     /// Starts the time limit of a reply that has just begun.
     fn limit_sending(&mut self);
-    /// Acknowledges the interrupt of [`limit_sending`](Self::limit_sending). Returns whether the time limit has
-    /// been reached.
-    fn take_limit(&mut self) -> bool;
+    /// Acknowledges the interrupt of [`limit_sending`](Self::limit_sending) and [`wake_at`](Self::wake_at), and returns
+    /// the reasons.
+    fn take_alarms(&mut self) -> Alarms;
+
+    /// Returns the time at which the line fell last, if it has fallen since the last call or
+    /// [`restart`](Self::restart).
+    fn fell(&mut self) -> Option<u32>;
+    /// Returns the time at which the character ends that was received just now.
+    fn end_of(&self, character: u8) -> u32;
+    /// Raises an interrupt at this time. Returns `false` when it has passed.
+    fn wake_at(&mut self, time: u32) -> bool;
 
     /// Sets every register up.
     fn set_up(&mut self);
+}
+
+/// The reasons of an interrupt of the timer that is not about silences.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Alarms {
+    /// A reply has reached its time limit.
+    pub limit: bool,
+    /// The time of [`GapTimer::wake_at`] has come.
+    pub wake: bool,
 }
 
 /// A silence on the line.

@@ -100,8 +100,8 @@ const TABLE: [(u32, i16, &[u16]); 22] = [
         ALL,
         &[0x08, 0x18, 0x1C, 0x20, 0x28, 0x2C, 0x34, 0x38, 0x3C],
     ),
-    // DIER without CC1IE, CR1, SMCR, CCMR1, CCMR2, CCER, PSC, ARR (RM0008 14.4).
-    (TIM1, !(1 << 1), &[0x0C]),
+    // DIER without CC1IE and CC2IE, CR1, SMCR, CCMR1, CCMR2, CCER, PSC, ARR (RM0008 14.4).
+    (TIM1, !(0b11 << 1), &[0x0C]),
     (TIM1, ALL, &[0x00, 0x08, 0x18, 0x1C, 0x20, 0x28, 0x2C]),
 ];
 const ALL: i16 = -1;

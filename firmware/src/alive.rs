@@ -18,8 +18,8 @@ pub enum Task {
     Uart,
     /// The silences of that line.
     Gap,
-    /// The time limit of a reply.
-    Limit,
+    /// The time limit of a reply, and the turns of an arbitration.
+    Alarm,
     /// The device's clock.
     Beat,
     /// The radio's UART.
@@ -96,7 +96,7 @@ mod tests {
     const ALL: [Task; TASKS] = [
         Task::Uart,
         Task::Gap,
-        Task::Limit,
+        Task::Alarm,
         Task::Beat,
         Task::RadioUart,
         Task::Radio,

@@ -7,14 +7,18 @@
 use board_support::line::{GapTimer, Silence, Uart};
 use modbus_server::{
     LineCounters, Reply, Request,
-    line::{Faults, Port},
+    fast::Contest,
+    line::{Arbitration, FastUnit, Faults, Port, Turn, Windows},
 };
 
 /// A line in use.
 pub struct Line<U, G> {
     uart: U,
     gap: G,
-    port: Port<'static>,
+    port: Port<'static, FastUnit>,
+    /// Times of an arbitration, and the end of the last request of Fast Modbus.
+    windows: Windows,
+    ended: Option<u32>,
     /// Milliseconds that a reply may take, in case the timer does not limit it, and milliseconds that the present
     /// one has taken.
     longest_ms: u16,
@@ -26,14 +30,22 @@ pub struct Line<U, G> {
 }
 
 impl<U: Uart, G: GapTimer> Line<U, G> {
-    /// Creates a line that receives. The gap timer measures the port's silences. A reply that takes more than
-    /// `longest_ms` milliseconds is aborted.
-    pub fn new(uart: U, mut gap: G, port: Port<'static>, longest_ms: u16) -> Self {
+    /// Creates a line that receives. The gap timer measures the port's silences, and the times of `windows` are in its
+    /// ticks. A reply that takes more than `longest_ms` milliseconds is aborted.
+    pub fn new(
+        uart: U,
+        mut gap: G,
+        port: Port<'static, FastUnit>,
+        windows: Windows,
+        longest_ms: u16,
+    ) -> Self {
         gap.restart();
         Self {
             uart,
             gap,
             port,
+            windows,
+            ended: None,
             longest_ms,
             sending_ms: 0,
             is_pending: false,
@@ -41,9 +53,11 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         }
     }
 
-    /// Handles the UART's interrupt. Returns true when a reply has just been sent.
+    /// Handles the UART's interrupt. `now_ms` returns the milliseconds since the start. Returns true when a reply has just
+    /// been sent, or a request waits to be served.
     #[inline]
-    pub fn on_uart(&mut self) -> bool {
+    pub fn on_uart(&mut self, now_ms: impl FnOnce() -> u32) -> bool {
+        let mut waits = false;
         let status = self.uart.status();
         // Checked first, because another station may drive the bus within a bit time after the last stop bit.
         if U::sent(status) {
@@ -54,9 +68,11 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         }
         if U::received(status) {
             let character = self.uart.read(status);
-            self.gap.restart();
             let faults = Faults::from_bits(character.faults);
-            self.port.received(character.byte, faults);
+            if self.port.received(character.byte, faults) {
+                waits = self.on_special(character.byte, now_ms());
+            }
+            self.gap.restart();
         }
         if U::wants_byte(status) {
             match self.port.next_byte() {
@@ -66,7 +82,21 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         } else if !U::received(status) {
             self.repaired |= self.uart.disable_other_interrupts();
         }
-        false
+        waits
+    }
+
+    /// Handles a character that may end a message of Fast Modbus, or is one of an arbitration. Returns whether a request
+    /// waits to be served.
+    #[inline(never)]
+    fn on_special(&mut self, character: u8, now_ms: u32) -> bool {
+        if let Some(at) = self.gap.fell() {
+            self.port.fell(at);
+        }
+        let waits = self.port.ends_fast_message(now_ms);
+        if waits {
+            self.ended = Some(self.gap.end_of(character));
+        }
+        waits
     }
 
     /// Handles the gap timer's interrupt at `now_ms` milliseconds after the start. Returns true when a request
@@ -81,15 +111,15 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         }
     }
 
-    /// Returns whether a reply is being sent.
+    /// Returns whether the line's registers change: a reply is being sent, or the unit arbitrates.
     pub fn is_sending(&self) -> bool {
-        self.port.is_sending()
+        self.port.is_sending() || self.port.is_arbitrating()
     }
 
     /// Returns whether a reply has not taken too long, or the driver is off and the end of a frame is measured. An event
     /// that is pending in two milliseconds, while its interrupt has not run, is not going to be handled.
     fn is_sound(&mut self) -> bool {
-        if self.port.is_sending() {
+        if self.is_sending() {
             return self.sending_ms < self.longest_ms;
         }
         if !self.uart.driver_is_off() {
@@ -111,16 +141,55 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
     pub fn repair(&mut self) {
         self.uart.set_up();
         self.gap.set_up();
+        self.port.withdraw();
         self.port.sent();
         self.gap.restart();
         self.repaired = true;
     }
 
-    /// Handles the interrupt of the time limit: a reply that is still being sent is aborted.
-    pub fn on_limit(&mut self) {
-        if self.gap.take_limit() && self.port.is_sending() {
+    /// Handles the interrupt of the time limit, when a reply that is still being sent is aborted, and of the unit's turns in
+    /// an arbitration.
+    pub fn on_alarm(&mut self) {
+        let alarms = self.gap.take_alarms();
+        if alarms.limit && self.port.is_sending() {
             self.repair();
         }
+        if alarms.wake {
+            self.take_turn();
+        }
+    }
+
+    fn take_turn(&mut self) {
+        if let Some(at) = self.gap.fell() {
+            self.port.fell(at);
+        }
+        match self.port.turn() {
+            Turn::None => {}
+            Turn::Bit(character) => self.uart.start_sending(character),
+            Turn::Reply(first) => self.begin(first),
+        }
+        self.wait_for_turn();
+    }
+
+    fn wait_for_turn(&mut self) {
+        if let Some(deadline) = self.port.deadline()
+            && !self.gap.wake_at(deadline)
+        {
+            self.port.withdraw();
+        }
+    }
+
+    /// Takes part in an arbitration, and sends the reply if this unit wins it.
+    pub fn arbitrate(&mut self, reply: Reply<'static>, contest: Contest) {
+        // A request with a function of unknown length inside has ended with a silence, so its reply can begin.
+        let Some(ended) = self.ended.take() else {
+            return self.send(reply, 0);
+        };
+        let Contest { value, windows } = contest;
+        let arbitration = Arbitration::new(value, windows, ended, self.windows);
+        self.port.arbitrate(reply, arbitration);
+        self.sending_ms = 0;
+        self.wait_for_turn();
     }
 
     /// Runs once per millisecond: advances the response delay and, when `checks`, repairs a line that does not work.
@@ -140,11 +209,16 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
     #[inline]
     fn start(&mut self) {
         if let Some(first) = self.port.start() {
-            self.gap.stop();
-            self.sending_ms = 0;
-            self.uart.start_sending(first);
-            self.gap.limit_sending();
+            self.begin(first);
         }
+    }
+
+    #[inline]
+    fn begin(&mut self, first: u8) {
+        self.gap.stop();
+        self.sending_ms = 0;
+        self.uart.start_sending(first);
+        self.gap.limit_sending();
     }
 
     /// Returns whether a reply is being sent or waits to be sent.

@@ -13,7 +13,7 @@ use embedded_hal::digital::{InputPin, OutputPin};
 use embedded_hal_nb::serial::{Read, Write};
 use modbus_server::{
     Adu, LineCounters, Reply, Request,
-    line::{Faults, Port, Receiver},
+    line::{FastUnit, Faults, Port, Receiver},
 };
 use modio_drivers::Lora;
 
@@ -22,7 +22,8 @@ use crate::config::RadioConfig;
 /// The radio line.
 pub struct RadioLine<S, M, A> {
     radio: Lora<S, M, A>,
-    port: Port<'static>,
+    /// Of the same type as that of the RS-485 line, so that both share their code.
+    port: Port<'static, FastUnit>,
     /// Silence that ends a frame that is not complete, in milliseconds.
     frame_gap_ms: u16,
     /// Time since the last byte, in milliseconds, until it has reached the frame gap.
@@ -71,10 +72,14 @@ where
         adus: &'static mut [Adu],
     ) -> Self {
         let packet_ms = module.packet_ms();
+        let units = FastUnit {
+            unit: Some(unit),
+            is_fast: false,
+        };
         let sending = if power_on { 0 } else { packet_ms };
         Self {
             radio: Lora::new(serial, mode, aux, module, sending),
-            port: Port::new(Receiver::rtu(unit, false), adus),
+            port: Port::new(Receiver::rtu(units, false), adus),
             frame_gap_ms,
             silence: Some(0),
             may_end_in_0: false,

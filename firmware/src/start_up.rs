@@ -1,5 +1,7 @@
 //! Decisions that the device makes once, when it starts.
 
+use modbus_server::{crc, fast::Part};
+
 use crate::config::LineConfig;
 
 /// Meaning of the position of DIP switch SW01.
@@ -10,7 +12,8 @@ pub enum Address {
     /// Serve the line as unit [`RECOVERY_UNIT`] with the factory's line settings, so that a unit with unknown
     /// settings can be reached.
     Recovery,
-    /// Not a unit address (0 and 248 to 253, without a loader 254, too): send nothing and blink the fault LED.
+    /// Not a unit address (0 and 248 to 253, without a loader 254, too): blink the fault LED, and take part only in scans
+    /// with function 70 and in requests by serial number.
     Invalid,
 }
 
@@ -41,13 +44,32 @@ impl Address {
     }
 }
 
-/// Returns the line settings to use: the configured ones, or the factory settings in recovery mode and without a
-/// valid address.
+/// Returns the serial number for function 70: in the range that the extension leaves to everyone, with a hash of the
+/// unique identity, or `low` if that is not 0 (SERIAL_LOW, for two units with the same hash).
+#[must_use]
+pub fn serial_number(unique_id: [u16; 6], low: u16) -> u32 {
+    let bytes = unique_id.into_iter().flat_map(u16::to_le_bytes);
+    let hash = bytes.fold(crc::START, crc::step);
+    0x0D00_0000 | u32::from(if low == 0 { hash } else { low })
+}
+
+/// Returns what a unit takes part in with function 70. `accurate`: its clock is a crystal's.
+#[must_use]
+pub const fn part(address: Address, accurate: bool) -> Part {
+    match address {
+        _ if !accurate => Part::Requests,
+        Address::Unit(_) => Part::Everything,
+        Address::Recovery => Part::Scans,
+        Address::Invalid => Part::NoEvents,
+    }
+}
+
+/// Returns the line settings to use: the configured ones, or the factory settings in recovery mode.
 #[must_use]
 pub const fn line(address: Address, configured: LineConfig) -> LineConfig {
     match address {
-        Address::Unit(_) => configured,
-        Address::Recovery | Address::Invalid => LineConfig::FACTORY,
+        Address::Unit(_) | Address::Invalid => configured,
+        Address::Recovery => LineConfig::FACTORY,
     }
 }
 
@@ -71,6 +93,18 @@ mod tests {
         }
         assert_eq!(Address::from_dip(255, false), Address::Recovery);
         assert_eq!(Address::from_dip(254, true), Address::Recovery);
+    }
+
+    #[test]
+    fn serial_number_is_a_hash_of_the_identity_or_set() {
+        let id = [0x0031, 0x0047, 0x5107, 0x3530, 0x3930, 0x3836];
+        let number = serial_number(id, 0);
+        assert_eq!(number >> 16, 0x0D00);
+        assert_ne!(
+            number,
+            serial_number([0x0032, 0x0047, 0x5107, 0x3530, 0x3930, 0x3836], 0)
+        );
+        assert_eq!(serial_number(id, 0x1234), 0x0D00_1234);
     }
 
     #[test]

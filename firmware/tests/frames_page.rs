@@ -25,7 +25,7 @@ use register_map::{Module, configuration};
 
 /// A modio-02 at unit address 1.
 struct Unit {
-    device: Device<1>,
+    device: &'static mut Device<1>,
     server: Server,
     port: Port<'static>,
     is_ascii: bool,
@@ -43,8 +43,8 @@ impl Unit {
             ..Identity::default()
         };
         let fixed = const { &Fixed::of(&MODIO_02) };
-        let mut device = Device::new(Config::new(&MODIO_02, settings, false), identity, fixed);
-        device.start();
+        let config = Config::new(&MODIO_02, settings, false);
+        let device = Device::new_in(Box::leak(Box::new_uninit()), config, identity, fixed);
 
         let mut inputs = Channels::new();
         if line.contains("Inputs 1 and 3 are energised") {
@@ -89,7 +89,7 @@ impl Unit {
         let Some(request) = self.port.take() else {
             return Vec::new();
         };
-        let reply = self.server.serve(request, &mut self.device);
+        let reply = self.server.serve(request, self.device);
         self.port.send(reply, 0);
         if let Some(command) = self.device.end_request() {
             self.device

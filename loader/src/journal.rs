@@ -21,11 +21,12 @@ use register_map::update::{Slot, State, crc32};
 
 use crate::Record;
 
-/// Half-words of a record.
-const HALVES: usize = 10;
-/// Half-words in front of the seals.
-const UNSEALED: usize = HALVES - 2;
-const BYTES: usize = 2 * HALVES;
+/// Bytes of a record.
+const BYTES: usize = 20;
+/// Offset of the CRC-32.
+const CRC: usize = 12;
+/// Offset of the seals.
+const SEALS: usize = 16;
 /// Version of the layout.
 const LAYOUT: u16 = 0x4201;
 
@@ -74,18 +75,17 @@ impl Journal {
     fn read(&mut self, page: Page, bytes: &[u8]) {
         // The newest record is the last, and a CRC takes 0.2 ms at 8 MHz.
         for (at, bytes) in bytes.as_chunks::<BYTES>().0.iter().enumerate().rev() {
-            let halves: [u16; HALVES] = core::array::from_fn(|n| {
-                u16::from_le_bytes([bytes[2 * n % BYTES], bytes[(2 * n + 1) % BYTES]])
-            });
-            let number = u32::from(halves[1]) << 16 | u32::from(halves[0]);
+            let [n0, n1, n2, n3, ..] = *bytes;
+            let number = u32::from_le_bytes([n0, n1, n2, n3]);
             let newest = self.newest.map_or(0, |newest| newest.number);
-            if number <= newest || !is_right(&halves) {
+            if number <= newest || !is_right(bytes) {
                 continue;
             }
             self.number = self.number.max(number);
-            let seals = [halves[UNSEALED] == 0, halves[UNSEALED + 1] == 0];
+            let [.., s0, s1, s2, s3] = *bytes;
+            let seals = [[s0, s1] == [0; 2], [s2, s3] == [0; 2]];
             if seals != [false; 2]
-                && let Some(record) = decoded(&halves)
+                && let Some(record) = decoded(bytes)
             {
                 self.newest = Some(Found {
                     page,
@@ -163,12 +163,11 @@ impl Journal {
     ) -> Result<(), WriteError<F::Error>> {
         // Each attempt has another number, because its remains may read as a record later.
         self.number += 1;
-        let halves = encoded(self.number, record);
-        for (n, half) in halves.into_iter().enumerate() {
-            flash.program(page, offset + 2 * n, half)?;
+        let unsealed = encoded(self.number, record);
+        for (n, half) in unsealed.as_chunks().0.iter().enumerate() {
+            flash.program(page, offset + 2 * n, u16::from_le_bytes(*half))?;
         }
-        let bytes = flash.page(page).get(offset..offset + 2 * UNSEALED);
-        if bytes != Some(halves.map(u16::to_le_bytes).as_flattened()) {
+        if flash.page(page).get(offset..offset + SEALS) != Some(&unsealed) {
             return Err(WriteError::Worn);
         }
         seal(flash, page, offset)?;
@@ -187,10 +186,10 @@ impl Journal {
 }
 
 fn seal<F: Pages>(flash: &mut F, page: Page, offset: usize) -> Result<(), WriteError<F::Error>> {
-    for n in UNSEALED..HALVES {
-        flash.program(page, offset + 2 * n, 0)?;
+    for at in (SEALS..BYTES).step_by(2) {
+        flash.program(page, offset + at, 0)?;
     }
-    let seals = flash.page(page).get(offset + 2 * UNSEALED..offset + BYTES);
+    let seals = flash.page(page).get(offset + SEALS..offset + BYTES);
     if seals == Some(&[0; 4]) {
         Ok(())
     } else {
@@ -198,51 +197,53 @@ fn seal<F: Pages>(flash: &mut F, page: Page, offset: usize) -> Result<(), WriteE
     }
 }
 
-fn encoded(number: u32, record: Record) -> [u16; UNSEALED] {
-    let [a, b] = record.states.map(State::code);
-    let preferred = u16::from(record.preferred == Slot::B);
-    let mut halves = [
-        number as u16,
-        (number >> 16) as u16,
-        preferred | u16::from(a.0) << 8 | u16::from(b.0) << 12,
-        u16::from_le_bytes([a.1, b.1]),
-        record.floor,
-        LAYOUT,
+/// Returns a record without its seals.
+fn encoded(number: u32, record: Record) -> [u8; SEALS] {
+    let [(a, of_a), (b, of_b)] = record.states.map(State::code);
+    let preferred = u8::from(record.preferred == Slot::B);
+    let [n0, n1, n2, n3] = number.to_le_bytes();
+    let [f0, f1] = record.floor.to_le_bytes();
+    let [l0, l1] = LAYOUT.to_le_bytes();
+    let mut bytes = [
+        n0,
+        n1,
+        n2,
+        n3,
+        preferred,
+        a | b << 4,
+        of_a,
+        of_b,
+        f0,
+        f1,
+        l0,
+        l1,
+        0,
+        0,
         0,
         0,
     ];
-    let crc = crc_of(&halves);
-    halves[UNSEALED - 2] = crc as u16;
-    halves[UNSEALED - 1] = (crc >> 16) as u16;
-    halves
-}
-
-/// Returns the CRC-32 of the half-words in front of it.
-fn crc_of(halves: &[u16; UNSEALED]) -> u32 {
-    let bytes = halves.map(u16::to_le_bytes);
-    crc32([bytes.as_flattened().split_at(2 * UNSEALED - 4).0, &[]])
+    let (covered, crc) = bytes.split_at_mut(CRC);
+    crc.copy_from_slice(&crc32([covered, &[]]).to_le_bytes());
+    bytes
 }
 
 /// Returns whether the layout and the CRC of a record are right.
-fn is_right(halves: &[u16; HALVES]) -> bool {
-    let Some((unsealed, _)) = halves.split_first_chunk::<UNSEALED>() else {
-        return false;
-    };
-    let [.., layout, low, high] = *unsealed;
-    layout == LAYOUT && u32::from(high) << 16 | u32::from(low) == crc_of(unsealed)
+fn is_right(bytes: &[u8; BYTES]) -> bool {
+    let (covered, rest) = bytes.split_at(CRC);
+    covered.ends_with(&LAYOUT.to_le_bytes())
+        && rest.starts_with(&crc32([covered, &[]]).to_le_bytes())
 }
 
 /// Returns the boot state of a record, or `None` if it has a state that only a newer image knows.
-fn decoded(halves: &[u16; HALVES]) -> Option<Record> {
-    let [_, _, codes, details, floor, ..] = *halves;
-    let [a, b] = details.to_le_bytes();
+fn decoded(bytes: &[u8; BYTES]) -> Option<Record> {
+    let [_, _, _, _, preferred, codes, of_a, of_b, f0, f1, ..] = *bytes;
     Some(Record {
-        preferred: if codes & 1 == 0 { Slot::A } else { Slot::B },
+        preferred: if preferred & 1 == 0 { Slot::A } else { Slot::B },
         states: [
-            State::from_code((codes >> 8) as u8 & 15, a)?,
-            State::from_code((codes >> 12) as u8, b)?,
+            State::from_code(codes & 15, of_a)?,
+            State::from_code(codes >> 4, of_b)?,
         ],
-        floor,
+        floor: u16::from_le_bytes([f0, f1]),
     })
 }
 

@@ -171,7 +171,7 @@ fn newest_record_counts_through_many_changes_of_pages() {
         // A record is ten operations; 51 fit a page.
         assert_eq!(
             flash.operations,
-            1000 * HALVES + 1000_usize.div_ceil(PAGE / BYTES)
+            1000 * (BYTES / 2) + 1000_usize.div_ceil(PAGE / BYTES)
         );
     }
 }
@@ -181,7 +181,7 @@ fn cut_at_any_operation_leaves_the_state_before_or_after_and_room_for_the_next()
     let in_page = (PAGE / BYTES) as u16;
     for count in [1, 2, in_page - 1, in_page, 2 * in_page] {
         let before = written(Flash::new(0xFF), count);
-        for at in 1..=HALVES + 1 {
+        for at in 1..=BYTES / 2 + 1 {
             for left in [Left::Nothing, Left::All, Left::Weak] {
                 let mut cut = before.clone();
                 let mut journal = open(&mut cut);
@@ -213,7 +213,7 @@ fn cut_at_any_operation_leaves_the_state_before_or_after_and_room_for_the_next()
 #[test]
 fn any_wrong_bit_of_a_record_makes_the_one_before_count() {
     let right = written(Flash::new(0xFF), 2);
-    for bit in 0..8 * 2 * UNSEALED {
+    for bit in 0..8 * SEALS {
         let mut flash = right.clone();
         flash.pages[0][BYTES + bit / 8] ^= 1 << (bit % 8);
         assert_eq!(open(&mut flash).record(), Some(state(1)), "bit {bit}");

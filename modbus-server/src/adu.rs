@@ -87,6 +87,28 @@ impl Adu {
         self.len = self.len.saturating_sub(count);
     }
 
+    /// Discards the first `count` bytes.
+    pub(crate) fn drop_front(&mut self, count: u8) {
+        for at in 0..=u8::MAX - count {
+            self.set(at, self.get(at + count));
+        }
+        self.cut(count.into());
+    }
+
+    /// Inserts `count` bytes at the front, with any content. Returns `false` and changes nothing when less than the two
+    /// bytes of a CRC would be left free.
+    pub(crate) fn add_front(&mut self, count: u8) -> bool {
+        let len = self.len + usize::from(count);
+        if len + 2 > Self::CAPACITY {
+            return false;
+        }
+        self.len = len;
+        for at in (0..=u8::MAX - count).rev() {
+            self.set(at + count, self.get(at));
+        }
+        true
+    }
+
     /// Discards the content.
     #[inline]
     pub const fn clear(&mut self) {

@@ -13,6 +13,8 @@ pub struct Request<'a> {
     pub(crate) line: LineCounters,
     /// Tick in which the request ended.
     pub(crate) ended: u32,
+    /// The unit has won the last arbitration on this line.
+    pub(crate) won: bool,
 }
 
 impl Request<'_> {

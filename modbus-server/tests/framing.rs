@@ -171,9 +171,9 @@ fn power_up_during_traffic_waits_for_silence() {
     let mut receiver = Receiver::rtu(UNIT, false);
     receiver.give_back(Box::leak(Box::default()));
     let mut receive = |bytes: &[u8]| {
-        bytes
-            .iter()
-            .for_each(|byte| receiver.character(*byte, Faults::NONE));
+        bytes.iter().for_each(|byte| {
+            receiver.character(*byte, Faults::NONE);
+        });
     };
     receive(&request());
     receive(&[0x00; 300]);
@@ -189,9 +189,9 @@ fn power_up_during_traffic_waits_for_silence() {
         Default::default(),
         "nothing was counted"
     );
-    request()
-        .iter()
-        .for_each(|byte| receiver.character(*byte, Faults::NONE));
+    request().iter().for_each(|byte| {
+        receiver.character(*byte, Faults::NONE);
+    });
     assert!(receiver.close().is_some());
 }
 

@@ -71,6 +71,8 @@ block! {
     COMMAND "COMMAND": 0x0108 x 1, Value::Codes(Command::NAMES), Rule::now(Values::OneOf(Command::CODES), 0);
     /// Requests that restart COMM_TIMEOUT
     COMM_SOURCE "COMM_SOURCE": 0x0109 x 1, Value::Codes(CommSource::NAMES), Rule::now(Values::up_to(3), 0);
+    /// Low word of the serial number for function 70; 0 = from the unique identity
+    SERIAL_LOW "SERIAL_LOW": 0x010B x 1, Value::NUMBER, Rule::restart(Values::ANY, 0);
     /// Module in the slot
     MODULE "MODULE": 0x0110 x 8, Value::Codes(Module::NAMES), Rule::restart(Values::up_to(Module::LAST), 0);
     /// Debounce, or low-pass over 2^n samples

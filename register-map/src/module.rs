@@ -24,7 +24,8 @@ macro_rules! modules {
             pub const NAMES: &'static [(u16, &'static str)] = &[$(($code, $name)),+];
 
             /// Returns the kinds of the four points of this module's port.
-            #[inline]
+            // Not inlined: one table serves every caller.
+            #[inline(never)]
             #[must_use]
             pub const fn points(self) -> [Kind; 4] {
                 match self {

@@ -138,10 +138,10 @@ impl Rule {
     /// Returns the allowed values for a point of this kind.
     #[inline]
     #[must_use]
-    pub fn values_for(&self, kind: Kind) -> Values {
+    pub fn values_for(&self, kind: Kind) -> &Values {
         match self.narrower {
-            Some(narrower) if narrower.kind == kind => narrower.values,
-            _ => self.values,
+            Some(narrower) if narrower.kind == kind => &narrower.values,
+            _ => &self.values,
         }
     }
 

@@ -137,6 +137,8 @@ block! {
     UNIQUE_ID "unique device identity": 0x0220 x 6, Value::Opaque, READ;
     /// Time since the start
     UPTIME_MS "uptime ms": 0x0226 x 2, Value::long("ms"), READ;
+    /// For function 70
+    SERIAL_NUMBER "serial number": 0x0228 x 2, Value::Opaque, READ;
     /// Bits 0-1 running slot, 2-4 state of the other slot, 5 trial, 6 SW01 = 254
     UPDATE "update": 0x022A x 1, Value::Opaque, READ;
     /// Good frames; counters wrap

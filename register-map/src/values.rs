@@ -62,8 +62,8 @@ impl Values {
         clippy::manual_contains,
         reason = "`contains` takes 68 bytes more in the image"
     )]
-    pub fn allow(self, value: u16) -> bool {
-        match self {
+    pub fn allow(&self, value: u16) -> bool {
+        match *self {
             Self::Range { min, max } => min <= value && value <= max,
             Self::RangeOr { also, min, max } => value == also || min <= value && value <= max,
             Self::OneOf(values) => values.iter().any(|one| *one == value),
@@ -72,8 +72,8 @@ impl Values {
 
     /// Returns whether the set contains all of these values. Faster than [`Self::allow`] for each of them.
     #[inline]
-    pub fn allow_all(self, mut values: impl Iterator<Item = u16>) -> bool {
-        let (also, min, max) = match self {
+    pub fn allow_all(&self, mut values: impl Iterator<Item = u16>) -> bool {
+        let (also, min, max) = match *self {
             Self::Range { min, max } => (min, min, max),
             Self::RangeOr { also, min, max } => (also, min, max),
             Self::OneOf(_) => return values.all(|value| self.allow(value)),

@@ -88,13 +88,12 @@ pub fn install(
     bus: DacBus,
 ) -> ([Installed; SLOTS], AnalogOutputs) {
     let workers = array::from_fn(|index| DacWorker::new(BOARD.slots[index].dac_address));
-    let mut installed = [const { Installed::None(Absent) }; SLOTS];
-    let plugged = modules
-        .into_iter()
-        .zip(BOARD.slots)
-        .zip(&mut sampler.inputs);
-    for (((module, slot), analog), place) in plugged.zip(&mut installed) {
-        *place = Installed::new(module, slot, analog);
-    }
+    let installed = array::from_fn(|index| {
+        Installed::new(
+            modules[index],
+            &BOARD.slots[index],
+            &mut sampler.inputs[index],
+        )
+    });
     (installed, AnalogOutputs { bus, workers })
 }

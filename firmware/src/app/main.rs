@@ -6,7 +6,7 @@
 //! | `uart` | USART1 | 4 | reads or writes a byte, turns the driver off at the end. At 921600 bit/s a byte is received every 12 us; if the task is later than that, a byte is lost, the receiver reports an overrun and the frame is discarded |
 //! | `gap` | TIM2 | 4 | handles t1.5 and t3.5. If late, a silence becomes longer, never shorter |
 //! | `radio_uart` | USART3 | 4 | moves a byte between the radio's UART and the queues. A byte is received every 1.04 ms; if the task is later than that, a byte is lost |
-//! | `limit` | TIM1_CC | 4 | aborts a reply that does not end. If late, the driver is on for longer |
+//! | `alarm` | TIM1_CC | 4 | takes the unit's turns in an arbitration. If late, a start bit is, which the windows allow for up to 8.5 us. Aborts a reply that does not end |
 //! | `serve` | EXTI3, pended by `gap`, `uart` and `radio` | 3 | serves a complete frame; executes a command when its response has been sent. If late, the response is late |
 //! | `scan` | EXTI1, pended by `beat` and by a write | 2 | copies inputs into the device and outputs to the modules, runs the time-outs. If late, it catches up |
 //! | `radio` | EXTI4, pended by `scan` while the radio is on | 2 | sets the radio up, receives frames and sends replies through the queues. If late, a silence becomes longer, never shorter |
@@ -81,7 +81,6 @@ mod app {
     struct Local {
         scan_timer: ScanTimer,
         upkeep: Upkeep,
-        radio_polling: Polling,
         serving: Serving,
         scanning: Scanning,
         radio_is_on: bool,
@@ -122,7 +121,6 @@ mod app {
                 radio_is_on,
                 scan_timer: started.scan_timer,
                 upkeep,
-                radio_polling: Polling::new(),
                 serving: started.serving,
                 scanning: started.scanning,
                 events,
@@ -146,12 +144,12 @@ mod app {
     #[task(binds = USART1, priority = 4, shared = [line])]
     fn uart(mut cx: uart::Context) {
         alive::begin(kept::marks(), Task::Uart);
-        let sent = cx
-            .shared
-            .line
-            .lock(|line| line.as_mut().is_some_and(Line::on_uart));
-        if sent {
-            // A command may have waited for the end of this reply.
+        let waits = cx.shared.line.lock(|line| {
+            line.as_mut()
+                .is_some_and(|line| line.on_uart(clock::millis))
+        });
+        if waits {
+            // Also after a reply, because a command may have waited for its end.
             rtic::pend(Interrupt::EXTI3);
         }
     }
@@ -169,11 +167,11 @@ mod app {
     }
 
     #[task(binds = TIM1_CC, priority = 4, shared = [line])]
-    fn limit(mut cx: limit::Context) {
-        alive::begin(kept::marks(), Task::Limit);
+    fn alarm(mut cx: alarm::Context) {
+        alive::begin(kept::marks(), Task::Alarm);
         cx.shared
             .line
-            .lock(|line| line.as_mut().map(Line::on_limit));
+            .lock(|line| line.as_mut().map(Line::on_alarm));
     }
 
     #[task(binds = TIM4, priority = 4, local = [scan_timer, upkeep], shared = [line, radio_uart])]
@@ -231,14 +229,11 @@ mod app {
         }
     }
 
-    #[task(binds = EXTI4, priority = 2, local = [radio_polling], shared = [radio, device])]
+    #[task(binds = EXTI4, priority = 2, local = [polling: Polling = Polling::new()], shared = [radio, device])]
     fn radio(cx: radio::Context) {
         alive::begin(kept::marks(), Task::Radio);
         let mut shared = cx.shared;
-        let waits = cx
-            .local
-            .radio_polling
-            .run(&mut shared.radio, &mut shared.device);
+        let waits = cx.local.polling.run(&mut shared.radio, &mut shared.device);
         if waits {
             rtic::pend(Interrupt::EXTI3);
         }

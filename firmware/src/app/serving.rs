@@ -10,7 +10,7 @@ use firmware::{
     config::{LineName, Origin},
     start_up::RECOVERY_UNIT,
 };
-use modbus_server::{LineCounters, Outcome, Request, Server, line::Framing};
+use modbus_server::{LineCounters, Outcome, Request, Server, fast, line::Framing};
 use register_map::codes::Command;
 use rtic::Mutex;
 
@@ -34,6 +34,8 @@ struct Served {
 /// The servers of the lines.
 pub struct Serving {
     rs485: Served,
+    /// This unit's part in function 70, which the RS-485 line serves.
+    unit: fast::Unit,
     radio: Served,
 }
 
@@ -41,7 +43,7 @@ impl Serving {
     /// Creates the servers of a unit. `rs485` is the framing of the RS-485 line and the silence that ends a frame
     /// there, in ms, rounded up. The radio line reports when a frame has ended itself. `points_only`: the radio line
     /// serves points and reads only.
-    pub const fn new(unit: u8, rs485: (Framing, u32), points_only: bool) -> Self {
+    pub const fn new(unit: u8, fast: fast::Unit, rs485: (Framing, u32), points_only: bool) -> Self {
         let radio = Server::new(Framing::Rtu);
         let radio = if points_only {
             radio.with_read_only_diagnostics()
@@ -57,6 +59,7 @@ impl Serving {
                 at_once: unit == RECOVERY_UNIT,
                 order: None,
             },
+            unit: fast,
             radio: Served {
                 server: radio,
                 line: LineName::Radio,
@@ -97,13 +100,15 @@ impl Serving {
         if self.rs485.order.is_none()
             && let Some(request) = rs485.lock(|line| line.as_mut()?.take())
         {
-            self.rs485.serve(request, rs485, radio, device);
+            self.rs485
+                .serve(request, &mut self.unit, rs485, radio, device);
             served = true;
         }
         if self.radio.order.is_none()
             && let Some(request) = radio.lock(|line| line.as_mut()?.take())
         {
-            self.radio.serve(request, rs485, radio, device);
+            self.radio
+                .serve(request, &mut self.unit, rs485, radio, device);
             served = true;
         }
         if !served {
@@ -125,6 +130,7 @@ impl Served {
     fn serve(
         &mut self,
         request: Request<'static>,
+        unit: &mut fast::Unit,
         rs485: &mut impl Mutex<T = Option<Line>>,
         radio: &mut impl Mutex<T = Option<Radio>>,
         device: &mut impl Mutex<T = &'static mut Device>,
@@ -134,18 +140,25 @@ impl Served {
             broadcast: request.unit() == BROADCAST,
         };
         let ended = request.ended();
-        let (reply, delay_ms) = device.lock(|device| {
+        let (reply, contest, delay_ms) = device.lock(|device| {
             let delay_ms = device.config.response_delay_ms();
             device.set_origin(origin);
-            (self.server.serve(request, &mut **device), delay_ms)
+            if request.unit() == fast::ADDRESS {
+                let (reply, contest) = self.server.serve_fast(request, unit, &mut **device);
+                return (reply, Some(contest), 0);
+            }
+            (self.server.serve(request, &mut **device), None, delay_ms)
         });
         let (outcome, writes) = (reply.outcome(), reply.writes());
-        match self.line {
-            LineName::Rs485 => {
+        match (self.line, contest) {
+            (LineName::Rs485, Some(contest)) => {
+                rs485.lock(|line| line.as_mut().map(|line| line.arbitrate(reply, contest)));
+            }
+            (LineName::Rs485, None) => {
                 let delay_ms = if self.at_once { 0 } else { delay_ms };
                 rs485.lock(|line| line.as_mut().map(|line| line.send(reply, delay_ms)));
             }
-            LineName::Radio => {
+            (LineName::Radio, _) => {
                 radio.lock(|line| line.as_mut().map(|line| line.send_reply(reply)));
             }
         }

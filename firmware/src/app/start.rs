@@ -15,8 +15,8 @@ use firmware::{
     store::{Store, WriteError},
 };
 use modbus_server::{
-    Adu,
-    line::{Framing, Gaps, Port, Receiver, Width},
+    Adu, fast,
+    line::{FastUnit, Framing, Gaps, Port, Receiver, Width, Windows},
 };
 use modio_drivers::DacLink;
 use register_map::{
@@ -102,7 +102,11 @@ pub fn up(
 
     let mut sampler = board.sampler;
     let (modules, analog_outputs) = install(installed, &mut sampler, board.dacs);
+    let serial_number = start_up::serial_number(board.unique_id, config.serial_low());
+    let is_rtu = settings.mode == Mode::Rtu;
     let identity = Identity {
+        serial_number,
+        reports_events: is_rtu && matches!(address, Address::Unit(_)),
         unit: address.unit().unwrap_or_default(),
         reset_cause: board.reset_cause,
         unique_id: board.unique_id,
@@ -110,8 +114,7 @@ pub fn up(
         internal_oscillator: !board.clock.is_crystal(),
         build: build(board.development),
     };
-    let device = place.write(Device::new(config, identity, DESCRIPTION));
-    device.start();
+    let device = Device::new_in(place, config, identity, DESCRIPTION);
     let updating = Updating::new(&mut pages, board.crc);
     device.update = updating.update(&mut pages, board.chosen);
     for (slot, port) in device.points.ports_mut().iter_mut().enumerate() {
@@ -148,17 +151,21 @@ pub fn up(
     let t35 = settings
         .frame_gap
         .map_or(gaps.t35, |tenths| gaps.frame_gap(tenths));
-    let line = address.unit().and_then(|unit| {
+    let units = FastUnit {
+        unit: address.unit(),
+        is_fast: is_rtu,
+    };
+    let start_line = || {
         let strict = settings.gap_rule == GapRule::Drop;
         let (receiver, (t15_ns, t35_ns)) = match framing {
-            Framing::Rtu => (Receiver::rtu(unit, strict), (gaps.t15.min(t35), t35)),
+            Framing::Rtu => (Receiver::rtu(units, strict), (gaps.t15.min(t35), t35)),
             Framing::Ascii { .. } => {
                 let width = match settings.format.data_bits() {
                     7 if on_wire.format.stop_in_data() != 0 => Width::SevenAndStop,
                     7 => Width::Seven,
                     _ => Width::Eight,
                 };
-                (Receiver::ascii(unit, width), (t35, Gaps::ASCII_TIMEOUT))
+                (Receiver::ascii(units, width), (t35, Gaps::ASCII_TIMEOUT))
             }
         };
         let limit_us = longest_reply_us(on_wire, framing);
@@ -171,8 +178,16 @@ pub fn up(
         // The count may begin just before a tick.
         let longest_ms = (limit_us / 1000) as u16 + 2;
         let port = Port::new(receiver, adus);
-        Some(Line::new(uart, gap, port, longest_ms))
-    });
+        let (bit, us) = gap.bit_and_us();
+        Some(Line::new(
+            uart,
+            gap,
+            port,
+            Windows::new(bit, us),
+            longest_ms,
+        ))
+    };
+    let line = start_line();
 
     let (radio, radio_uart) = radio_config
         .and_then(|config| {
@@ -197,6 +212,11 @@ pub fn up(
         radio_uart,
         serving: Serving::new(
             identity.unit,
+            fast::Unit::new(
+                serial_number,
+                identity.unit,
+                start_up::part(address, board.clock.is_crystal()),
+            ),
             (framing, t35.div_ceil(1_000_000)),
             points_only,
         ),

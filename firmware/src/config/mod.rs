@@ -33,7 +33,7 @@ use modbus_server::{Exception, Span, Words, WordsOut};
 use register_map::codes::{CommSource, Command, Lora};
 use register_map::configuration::{
     COMM_SOURCE, COMM_TIMEOUT, COMMAND, FILTER, FORMAT, KEY, LORA, MODE, MODULE, RESPONSE_DELAY,
-    RULES, SAVES,
+    RULES, SAVES, SERIAL_LOW,
 };
 use register_map::points;
 use register_map::state::status;
@@ -475,6 +475,12 @@ impl<const SLOTS: usize> Config<SLOTS> {
         let first = points::of_port(self.board.first_port.wrapping_add(index as u16));
         self.is_in_force(index)
             .then(|| Point::of(&self.edited, first.wrapping_add(channel as u16)))
+    }
+
+    /// Returns SERIAL_LOW.
+    #[must_use]
+    pub fn serial_low(&self) -> u16 {
+        self.edited.get(SERIAL_LOW)
     }
 
     /// Returns COMM_TIMEOUT in milliseconds, up to an hour, or `None` when the communication watchdog is off.

@@ -18,6 +18,7 @@
 mod comm_watchdog;
 mod description;
 mod edge_log;
+mod events;
 mod identification;
 mod linking;
 mod points;
@@ -27,10 +28,11 @@ mod state;
 #[cfg(test)]
 mod tests;
 
-use core::ops::Range;
+use core::{mem::MaybeUninit, ops::Range};
 
+use modbus_server::fast::{self, EventSource, Packet, Waiting};
 use modbus_server::{
-    Bits, BitsOut, DataModel, Exception, Server, Span, Table, TextOut, Words, WordsOut,
+    Adu, Bits, BitsOut, DataModel, Exception, Server, Span, Table, TextOut, Words, WordsOut,
 };
 use modio_drivers::{CHANNELS, Channels};
 use register_map::configuration::COMMAND;
@@ -41,6 +43,7 @@ pub use comm_watchdog::CommWatchdog;
 use description::Description;
 pub use description::Fixed;
 use edge_log::EdgeLog;
+use events::Events;
 pub use points::Points;
 pub use port::IoPort;
 pub use state::{Identity, State};
@@ -64,6 +67,7 @@ pub struct Device<const SLOTS: usize> {
     levels: [u8; SLOTS],
     /// The levels are those of a scan. From then on a change is an edge.
     linked: bool,
+    events: Events<SLOTS>,
     /// A command from a request, to be executed when its reply has been sent.
     ordered: Option<Command>,
     /// The device is to restart once no save is under way.
@@ -124,13 +128,17 @@ impl Block {
 }
 
 impl<const SLOTS: usize> Device<SLOTS> {
-    /// Creates a device with these settings, whose slots have channels of these kinds, in the order of the ports.
-    /// `description` is that of the board. [`Self::start`] must follow: it works in place, because a device is too large to
-    /// be on the stack more than once.
+    /// Creates a device with these settings in `place`, because it is too large to be moved over the stack. The outputs
+    /// are set to START. `description` is that of the board.
     #[must_use]
     #[inline(never)]
-    pub fn new(config: Config<SLOTS>, identity: Identity, description: &'static Fixed) -> Self {
-        Self {
+    pub fn new_in<'a>(
+        place: &'a mut MaybeUninit<Self>,
+        config: Config<SLOTS>,
+        identity: Identity,
+        description: &'static Fixed,
+    ) -> &'a mut Self {
+        let device = place.write(Self {
             points: Points::new(config.board().points().start, config.modules()),
             state: State::new(config.board(), identity),
             description: Description::new(description, &config),
@@ -138,6 +146,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
             edges: EdgeLog::new(),
             levels: [0; SLOTS],
             linked: false,
+            events: Events::new(),
             ordered: None,
             restart: None,
             update: None,
@@ -145,13 +154,10 @@ impl<const SLOTS: usize> Device<SLOTS> {
             activity: false,
             revision: config.revision(),
             config,
-        }
-    }
-
-    /// Applies the settings to the points, and sets the outputs to START.
-    pub fn start(&mut self) {
-        self.configure_points();
-        self.for_each_point(|port, channel, point| port.command_raw(channel, point.start));
+        });
+        device.configure_points();
+        device.for_each_point(|port, channel, point| port.command_raw(channel, point.start));
+        device
     }
 
     /// Applies the settings in force to the points, after the settings may have changed.
@@ -204,7 +210,19 @@ impl<const SLOTS: usize> Device<SLOTS> {
         let Some(port) = self.points.ports_mut().get_mut(slot) else {
             return;
         };
-        port.scanned(channels, words, now, first, &mut self.edges);
+        let edges = port.scanned(channels, words, now);
+        self.events.look(slot, port, now);
+        if edges == 0 {
+            return;
+        }
+        for (channel, settings) in port.settings().iter().enumerate() {
+            if edges >> channel & 1 != 0 {
+                let point = first.wrapping_add(channel as u16);
+                let level = channels.bit(channel);
+                self.edges.add(point, level, now, settings.filter);
+                self.events.edge(slot, channel, level);
+            }
+        }
     }
 
     /// Restarts the communication watchdog, unless COMM_SOURCE excludes the request: a valid request for this unit ended
@@ -487,6 +505,24 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
         self.status()
     }
 
+    /// Function 70 with the unit's own address: which points report events.
+    fn check_custom(&self, code: u8, data: &[u8]) -> Result<(), Exception> {
+        let is_served = code == fast::FUNCTION
+            && self.state.reports_events()
+            && self.config.origin_line() == LineName::Rs485;
+        if !is_served {
+            return Err(Exception::IllegalFunction);
+        }
+        fast::check_settings(data)
+    }
+
+    fn serve_custom(&mut self, _: u8, adu: &mut Adu) {
+        let (ports, first) = (self.points.ports(), self.points.first_of(0));
+        fast::apply_settings(adu, |kind, id, to| {
+            self.events.set(ports, first, kind, id, to)
+        });
+    }
+
     fn server_id(&self) -> &[u8] {
         self.state.server_id()
     }
@@ -500,5 +536,20 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
         let value = identification::object(object, self.state.serial(), &self.config);
         text.extend(value.unwrap_or_default());
         value.is_some()
+    }
+}
+
+impl<const SLOTS: usize> EventSource for Device<SLOTS> {
+    fn waiting(&self) -> Waiting {
+        self.events.waiting()
+    }
+
+    fn reports_start(&self) -> bool {
+        self.events.reports_start()
+    }
+
+    fn fill(&mut self, packet: &mut Packet) {
+        let first = self.points.first_of(0);
+        self.events.fill(packet, self.points.ports(), first);
     }
 }

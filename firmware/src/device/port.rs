@@ -2,8 +2,8 @@
 
 use modio_drivers::{CHANNELS, ChannelSettings, ChannelStatus, Channels, Code, Kind, scale};
 use register_map::codes::ModuleState;
+use register_map::limits;
 
-use super::edge_log::EdgeLog;
 use crate::config::Point;
 use crate::links::Act;
 
@@ -75,16 +75,10 @@ impl IoPort {
 
     /// Stores the inputs of a scan. Outputs keep their commanded values, which may have changed during the scan.
     /// The settings may have changed, too: then the words of the scan have the wrong unit and are ignored (`words`
-    /// is false). `now` is the uptime in ms, not 0. Ends pulses. Logs the edges of digital inputs; `first` is the port's
-    /// first point.
-    pub(super) fn scanned(
-        &mut self,
-        scanned: &Channels,
-        words: bool,
-        now: u32,
-        first: u16,
-        log: &mut EdgeLog,
-    ) {
+    /// is false). `now` is the uptime in ms, not 0. Ends pulses. Returns the digital inputs that have changed, channel 1 in
+    /// bit 0.
+    pub fn scanned(&mut self, scanned: &Channels, words: bool, now: u32) -> u8 {
+        let mut changed = 0;
         for channel in 0..CHANNELS {
             let is_over = |end: &u32| *end != 0 && now.wrapping_sub(*end).cast_signed() >= 0;
             if self.pulse_ends.get(channel).is_some_and(is_over) {
@@ -92,16 +86,12 @@ impl IoPort {
             }
         }
         let inputs = self.pulses.iter_mut().zip(&mut self.edges);
-        let inputs = inputs.zip(&self.settings);
-        for (channel, (kind, ((pulses, edge), settings))) in
-            self.kinds.iter().zip(inputs).enumerate()
-        {
+        for (channel, (kind, (pulses, edge))) in self.kinds.iter().zip(inputs).enumerate() {
             match kind {
                 Kind::BitInput => {
                     let level = scanned.bit(channel);
                     if self.scanned && level != self.channels.bit(channel) {
-                        let point = first.wrapping_add(channel as u16);
-                        log.add(point, level, now, settings.filter);
+                        changed |= 1 << channel;
                         *edge = now;
                         *pulses = pulses.wrapping_add(level.into());
                     }
@@ -115,6 +105,7 @@ impl IoPort {
             }
         }
         self.scanned = true;
+        changed
     }
 
     /// Returns the uptime of the last edge of each digital input in ms; 0 without one.
@@ -168,6 +159,23 @@ impl IoPort {
             }
             _ => {}
         }
+    }
+
+    /// Returns the value of a channel: 0 or 1 for a bit.
+    pub(super) fn value(&self, channel: usize) -> u16 {
+        match self.kind(channel) {
+            Kind::WordInput | Kind::WordOutput => self.channels.word(channel),
+            Kind::None | Kind::BitInput | Kind::BitOutput => self.channels.bit(channel).into(),
+        }
+    }
+
+    /// Returns the smallest change of a word that is an event: 1/256 of its range.
+    pub(super) fn deadband(&self, channel: usize) -> u16 {
+        let range = self.setting(channel).map(|setting| {
+            let (min, max) = limits::of_input(setting.signal, setting.scale);
+            max.abs_diff(min)
+        });
+        range.unwrap_or_default() / 256
     }
 
     /// Sets the outputs to SAFE.

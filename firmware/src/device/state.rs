@@ -22,6 +22,10 @@ pub struct Identity {
     pub fault: [u16; fault_words()],
     /// The core runs on the internal oscillator.
     pub internal_oscillator: bool,
+    /// Serial number for function 70.
+    pub serial_number: u32,
+    /// The unit reports events with function 70.
+    pub reports_events: bool,
     /// Bits of the register BUILD that depend on loader and slot.
     pub build: u16,
 }
@@ -128,6 +132,11 @@ impl State {
         self.identity.internal_oscillator
     }
 
+    /// Returns whether the unit reports events with function 70.
+    pub(super) const fn reports_events(&self) -> bool {
+        self.identity.reports_events
+    }
+
     /// Returns the seconds since the start.
     #[must_use]
     pub const fn uptime_s(&self) -> u32 {
@@ -144,6 +153,7 @@ impl State {
         let [product_high, product_low] = words_of(at::PRODUCT);
         let [uptime_high, uptime_low] = words_of(self.uptime_s);
         let [millis_high, millis_low] = words_of(self.millis);
+        let [serial_high, serial_low] = words_of(self.identity.serial_number);
         let [commit_high, commit_low] = words_of(built::COMMIT);
         let [version, patch] = VERSION;
         match address {
@@ -159,6 +169,8 @@ impl State {
             0x0209 => uptime_low,
             at::UPTIME_MS => millis_high,
             0x0227 => millis_low,
+            at::SERIAL_NUMBER => serial_high,
+            0x0229 => serial_low,
             at::STACK_FREE => self.stack_free,
             at::COMMIT => commit_high,
             0x020D => commit_low,

@@ -5,7 +5,7 @@ use core::cell::Cell;
 use std::boxed::Box;
 use std::vec::Vec;
 
-use board_support::line::Character;
+use board_support::line::{Alarms, Character};
 use modbus_server::line::{Framing, Receiver};
 use modbus_server::{Adu, Server, Tables};
 
@@ -100,7 +100,11 @@ struct FakeGap {
     running: bool,
     passed: Option<Silence>,
     limited: bool,
-    limit_passed: bool,
+    alarms: Alarms,
+    /// The time of an arbitration, of its next turn, and of the last falling edge.
+    now: u32,
+    wake: u32,
+    fell: Option<u32>,
     /// The timer stops directly after the next read of its state.
     stops: Cell<bool>,
     stopped: Cell<bool>,
@@ -143,8 +147,21 @@ impl GapTimer for FakeGap {
         self.limited = true;
     }
 
-    fn take_limit(&mut self) -> bool {
-        core::mem::take(&mut self.limit_passed)
+    fn take_alarms(&mut self) -> Alarms {
+        core::mem::take(&mut self.alarms)
+    }
+
+    fn fell(&mut self) -> Option<u32> {
+        self.fell.take()
+    }
+
+    fn end_of(&self, _: u8) -> u32 {
+        self.now
+    }
+
+    fn wake_at(&mut self, time: u32) -> bool {
+        self.wake = time;
+        time.wrapping_sub(self.now).cast_signed() > 0
     }
 
     fn set_up(&mut self) {
@@ -162,14 +179,23 @@ struct Bench {
 const REQUEST: [u8; 8] = [0x11, 0x03, 0x00, 0x04, 0x00, 0x01, 0xC7, 0x5B];
 const REPLY: [u8; 7] = [0x11, 0x03, 0x02, 0x11, 0x11, 0xB5, 0xDB];
 const LONGEST_MS: u16 = 20;
+const WINDOWS: Windows = Windows {
+    start: 1_000,
+    length: 100,
+    guard: 10,
+};
 
 impl Bench {
     fn new() -> Self {
         let adus = Box::leak(Box::new([Adu::new(), Adu::new()]));
-        let port = Port::new(Receiver::rtu(17, false), adus);
+        let units = FastUnit {
+            unit: Some(17),
+            is_fast: true,
+        };
+        let port = Port::new(Receiver::rtu(units, false), adus);
         let (uart, gap) = (FakeUart::default(), FakeGap::default());
         let mut bench = Self {
-            line: Line::new(uart, gap, port, LONGEST_MS),
+            line: Line::new(uart, gap, port, WINDOWS, LONGEST_MS),
             server: Server::new(Framing::Rtu),
             registers: [0x1111; 10],
         };
@@ -188,7 +214,7 @@ impl Bench {
     fn receive(&mut self, bytes: &[u8]) {
         for byte in bytes {
             self.line.uart.waiting = Some(*byte);
-            assert!(!self.line.on_uart());
+            assert!(!self.line.on_uart(|| 0));
         }
     }
 
@@ -206,7 +232,7 @@ impl Bench {
     /// Runs the UART's interrupts up to the end of the reply.
     fn send(&mut self) {
         for _ in 0..600 {
-            if self.line.on_uart() {
+            if self.line.on_uart(|| 0) {
                 return;
             }
         }
@@ -296,10 +322,10 @@ fn reply_that_does_not_end_is_aborted() {
     bench.receive(&REQUEST);
     assert!(bench.silence(Silence::T35));
     bench.serve();
-    bench.line.on_limit();
+    bench.line.on_alarm();
     assert!(bench.line.uart.driver, "the limit has not been reached");
-    bench.line.gap.limit_passed = true;
-    bench.line.on_limit();
+    bench.line.gap.alarms.limit = true;
+    bench.line.on_alarm();
     assert!(!bench.line.uart.driver && bench.pass(1));
 }
 
@@ -309,7 +335,7 @@ fn interrupt_without_a_cause_is_disabled() {
     bench.line.uart.others = true;
     bench.receive(&REQUEST[..1]);
     assert!(bench.line.uart.others);
-    assert!(!bench.line.on_uart());
+    assert!(!bench.line.on_uart(|| 0));
     assert!(!bench.line.uart.others);
     assert!(bench.pass(1), "it is a repair");
 }

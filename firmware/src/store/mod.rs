@@ -113,6 +113,8 @@ impl Store {
     /// # Errors
     ///
     /// When the flash fails. The stored configuration is still valid, and later saves are still tried.
+    // Not inlined into init, whose frame is too large for short instructions.
+    #[inline(never)]
     pub fn prepare<F: Pages>(&mut self, flash: &mut F) -> Result<(), WriteError<F::Error>> {
         // Use the survey that selected the configuration in force. A second survey could find another record,
         // because a seal whose programming was interrupted may read differently every time.

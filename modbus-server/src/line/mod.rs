@@ -4,10 +4,13 @@
 //! between a colon and an end mark, with an LRC. A [`Port`] supports both; its [`Receiver`] selects the mode. All
 //! other parts are the same for both modes.
 
+mod arbitration;
 mod ascii;
 mod faults;
 mod framing;
 mod gaps;
+mod length;
+mod messages;
 mod port;
 mod receiver;
 mod state;
@@ -15,12 +18,13 @@ mod timed;
 mod transmitter;
 mod units;
 
+pub use arbitration::{Arbitration, Step, Windows};
 pub use ascii::Width;
 pub use faults::Faults;
 pub use framing::Framing;
 pub use gaps::Gaps;
-pub use port::Port;
+pub use port::{Port, Turn};
 pub use receiver::Receiver;
 pub use timed::{Silences, TimedPort};
 use transmitter::Transmitter;
-pub use units::{UnitSet, Units};
+pub use units::{FastUnit, UnitSet, Units};

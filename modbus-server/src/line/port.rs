@@ -1,7 +1,7 @@
 //! A line as its server uses it: takes characters and silences, returns requests; takes replies, returns
 //! characters.
 
-use super::{Faults, Receiver, Transmitter, Units};
+use super::{Arbitration, Faults, Framing, Receiver, Step, Transmitter, Units};
 use crate::{Adu, LineCounters, Reply, Request};
 
 /// One serial line of a server, without UART, timer or clock.
@@ -35,6 +35,21 @@ pub struct Port<'a, U = u8> {
     reply: State,
     /// Number of valid frames on the bus when the last request ended.
     messages_before: u16,
+    /// A reply that is sent if its arbitration is won.
+    contender: Option<(&'a mut Adu, Arbitration)>,
+    /// The last arbitration was won.
+    won: bool,
+}
+
+/// What a port wants at the [deadline](Port::deadline) of an arbitration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Turn {
+    /// Nothing.
+    None,
+    /// Send this character alone.
+    Bit(u8),
+    /// Send this first character of the reply.
+    Reply(u8),
 }
 
 /// State of the reply.
@@ -61,13 +76,22 @@ impl<'a, U: Units> Port<'a, U> {
             request: None,
             reply: State::None,
             messages_before: 0,
+            contender: None,
+            won: false,
         }
     }
 
-    /// Processes a received character and its faults.
+    /// Processes a received character and its faults. Returns whether [`ends_fast_message`](Self::ends_fast_message)
+    /// must be called: only on a line with a [`FastUnit`](super::FastUnit).
     #[inline(always)]
-    pub fn received(&mut self, byte: u8, faults: Faults) {
-        self.receiver.character(byte, faults);
+    pub fn received(&mut self, byte: u8, faults: Faults) -> bool {
+        self.receiver.character(byte, faults)
+    }
+
+    /// Ends the frame if it is a whole message of [Fast Modbus](crate::fast), in tick `now`, which ends without a silence.
+    /// Returns whether a request waits to be served.
+    pub fn ends_fast_message(&mut self, now: u32) -> bool {
+        self.receiver.is_fast_message() && self.close(now)
     }
 
     /// Returns whether the RTU frame so far has a valid CRC and the length that its function requires: of a request,
@@ -114,7 +138,11 @@ impl<'a, U: Units> Port<'a, U> {
             }
             return false;
         }
-        self.close(now)
+        let waits = self.close(now);
+        if U::FAST {
+            self.receiver.end_quiet();
+        }
+        waits
     }
 
     fn close(&mut self, ended: u32) -> bool {
@@ -137,10 +165,14 @@ impl<'a, U: Units> Port<'a, U> {
         if matches!(self.reply, State::Waiting(_)) {
             self.drop_reply();
         }
+        if U::FAST {
+            self.withdraw();
+        }
         Some(Request {
             adu,
             line: *self.receiver.counters(),
             ended,
+            won: core::mem::take(&mut self.won),
         })
     }
 
@@ -163,6 +195,71 @@ impl<'a, U: Units> Port<'a, U> {
         self.transmitter = Transmitter::new(reply.adu, framing);
         // The request ended within a tick, so the first tick does not count.
         self.reply = State::Waiting(if delay == 0 { 0 } else { 1 + u32::from(delay) });
+    }
+
+    /// Takes a reply that is sent if its arbitration is won. Call [`fell`](Self::fell) when the line falls, at the latest in
+    /// front of the next turn, and [`turn`](Self::turn) at each [`deadline`](Self::deadline). A frame that has come since the request ends the arbitration.
+    pub fn arbitrate(&mut self, reply: Reply<'a>, arbitration: Arbitration) {
+        let is_late = self.request.is_some() || !self.receiver.is_idle();
+        if !reply.is_answered || is_late || self.reply == State::Sending {
+            return self.receiver.give_back(reply.adu);
+        }
+        self.contender = Some((reply.adu, arbitration));
+    }
+
+    /// Returns the time at which [`turn`](Self::turn) must be called, while the unit arbitrates.
+    #[must_use]
+    pub fn deadline(&self) -> Option<u32> {
+        self.contender
+            .as_ref()
+            .map(|(_, arbitration)| arbitration.deadline())
+    }
+
+    /// Notes the last time at which the line fell, while the unit arbitrates.
+    pub const fn fell(&mut self, at: u32) {
+        if let Some((_, arbitration)) = &mut self.contender {
+            arbitration.fell(at);
+        }
+    }
+
+    /// Takes the unit's turn in its arbitration.
+    pub fn turn(&mut self) -> Turn {
+        let Some((_, arbitration)) = &mut self.contender else {
+            return Turn::None;
+        };
+        match arbitration.step() {
+            Step::Wait => Turn::None,
+            Step::Send => Turn::Bit(Arbitration::ZERO),
+            Step::Lost => {
+                self.withdraw();
+                Turn::None
+            }
+            Step::Won => self.reply_to_all().map_or(Turn::None, Turn::Reply),
+        }
+    }
+
+    /// Starts the reply of the unit that has won, and returns its first character.
+    fn reply_to_all(&mut self) -> Option<u8> {
+        let (adu, _) = self.contender.take()?;
+        self.transmitter = Transmitter::new(adu, Framing::Rtu);
+        self.reply = State::Sending;
+        self.won = true;
+        self.receiver.end_following();
+        self.transmitter.next()
+    }
+
+    /// Ends an arbitration without a reply.
+    pub fn withdraw(&mut self) {
+        if let Some((adu, _)) = self.contender.take() {
+            self.receiver.give_back(adu);
+        }
+    }
+
+    /// Returns whether the unit arbitrates.
+    #[inline]
+    #[must_use]
+    pub const fn is_arbitrating(&self) -> bool {
+        self.contender.is_some()
     }
 
     /// Advances the time by a tick. Returns whether the delay of a reply has passed, so that it may
@@ -220,7 +317,7 @@ impl<'a, U: Units> Port<'a, U> {
     #[must_use]
     pub fn is_replying(&self) -> bool {
         match self.reply {
-            State::None => false,
+            State::None => U::FAST && self.is_arbitrating(),
             State::Waiting(_) => self.request.is_none(),
             State::Sending => true,
         }

@@ -1,13 +1,14 @@
 //! Turns characters and silences into valid requests for this unit.
 
 use super::ascii::{self, Part, Reader, Width};
+use super::messages::{Message, begins_reply};
 use super::state::{
-    ASCII, ASCII_ENDED, ASCII_IDLE, DEAF, IDLE, NOT_ENDED, OVERRUN, PAUSED, RTU, SPOILED, TORN,
-    UNKEPT,
+    ASCII, ASCII_ENDED, ASCII_IDLE, DEAF, FOLLOWS, IDLE, NOT_ENDED, OVERRUN, PAUSED, QUIET, RTU,
+    SPOILED, TORN, UNKEPT,
 };
-use super::{Faults, Framing, Units};
+use super::{Faults, Framing, Units, length};
 use crate::counters::count;
-use crate::{Adu, BROADCAST, LineCounters, crc, length};
+use crate::{Adu, BROADCAST, LineCounters, crc};
 
 /// The receiving half of a line (V1.02 2.5.1.1, figure 14, for RTU; 2.5.2.1, figure 17, for ASCII).
 ///
@@ -113,19 +114,23 @@ impl<'a, U: Units> Receiver<'a, U> {
         count(&mut self.counters.unsent);
     }
 
-    /// Processes a received character.
+    /// Processes a received character. Returns whether it may be the last of a message of Fast Modbus, or one of an
+    /// arbitration.
     #[inline(always)]
-    pub fn character(&mut self, byte: u8, faults: Faults) {
+    pub fn character(&mut self, byte: u8, faults: Faults) -> bool {
         let special = self.state | u16::from(faults.bits());
         if special != 0 {
             if special != IDLE {
-                return self.special(byte, faults);
+                self.special(byte, faults);
+                return U::FAST;
             }
             // The first character of an RTU frame needs no other treatment, because everything is prepared for it.
             self.state = 0;
         }
-        self.check = crc::step(self.check, byte);
+        let check = crc::step(self.check, byte);
+        self.check = check;
         self.keep(byte);
+        U::FAST && check == crc::GOOD
     }
 
     /// Notes that 1.5 characters of silence have passed, in RTU mode. Has no effect in ASCII mode.
@@ -156,8 +161,16 @@ impl<'a, U: Units> Receiver<'a, U> {
             return false;
         }
         self.filling.as_ref().is_some_and(|adu| {
-            length::is_request(adu) || (!self.takes(adu.get(0)) && length::is_reply(adu))
+            length::is_request(adu, 0) || (!self.takes(adu.get(0)) && length::is_reply(adu, 0))
         })
+    }
+
+    /// Returns whether the RTU frame so far is a whole message of Fast Modbus between a master and all units: it has a
+    /// valid CRC and the length that its sub-function requires. It ends without a silence: [`close`](Self::close) it.
+    pub fn is_fast_message(&self) -> bool {
+        self.check == crc::GOOD
+            && self.state & !(FOLLOWS | QUIET) == 0
+            && (self.filling.as_ref()).is_some_and(|adu| Message::of(adu).is_some())
     }
 
     /// Returns whether the frame so far can never become valid: it is damaged or too long, or its beginning was missed.
@@ -169,7 +182,11 @@ impl<'a, U: Units> Receiver<'a, U> {
     /// Returns whether requests to this address are taken.
     #[inline(always)]
     fn takes(&self, address: u8) -> bool {
-        address == BROADCAST || self.units.contains(address)
+        if address == BROADCAST {
+            self.units.takes_broadcasts()
+        } else {
+            self.units.contains(address)
+        }
     }
 
     /// Returns whether no frame has begun.
@@ -193,7 +210,7 @@ impl<'a, U: Units> Receiver<'a, U> {
     /// Continues after the unit has sent with its receiver off: the next character starts a frame.
     #[inline(always)]
     pub fn resume(&mut self) {
-        self.state = IDLE | (self.state & ASCII);
+        self.state = IDLE | (self.state & (ASCII | FOLLOWS | QUIET));
         self.check = if self.state & ASCII == 0 {
             crc::START
         } else {
@@ -208,6 +225,55 @@ impl<'a, U: Units> Receiver<'a, U> {
         if self.filling.is_none() {
             self.state |= UNKEPT;
             self.unkept = 0;
+        }
+    }
+
+    /// Returns whether a valid RTU frame is a reply of Fast Modbus, and notes what follows it.
+    #[inline]
+    fn is_fast_reply(&mut self) -> bool {
+        let frame = self.filling.as_ref();
+        let message = frame.and_then(|adu| Message::of(adu));
+        self.state &= !(FOLLOWS | QUIET);
+        self.state |= match message {
+            Some(Message::Request) => FOLLOWS,
+            Some(Message::Reply) => QUIET,
+            None => 0,
+        };
+        message == Some(Message::Reply)
+    }
+
+    /// The unit itself sends the reply of Fast Modbus.
+    pub(super) const fn end_following(&mut self) {
+        self.state = self.state & !FOLLOWS | QUIET;
+    }
+
+    /// Ends [`QUIET`]: the line has been silent since the reply.
+    #[inline]
+    pub(super) const fn end_quiet(&mut self) {
+        self.state &= !QUIET;
+    }
+
+    /// Drops what is in front of the reply of Fast Modbus that the last three characters begin, if they do. While units
+    /// arbitrate, several start bits can overlap, so that these characters need not be FF.
+    fn seek_reply(&mut self) {
+        let Some(adu) = &mut self.filling else {
+            return;
+        };
+        let Some(at) = adu.len().checked_sub(3) else {
+            return;
+        };
+        // Below 256.
+        let at = at as u8;
+        if begins_reply(adu.get(at), adu.get(at + 1), adu.get(at + 2)) {
+            adu.clear();
+            self.check = crc::START;
+            self.state = FOLLOWS;
+            // No byte is overwritten before it is read.
+            for n in 0..3 {
+                let byte = adu.get(at + n);
+                self.check = crc::step(self.check, byte);
+                adu.push(byte);
+            }
         }
     }
 
@@ -234,11 +300,13 @@ impl<'a, U: Units> Receiver<'a, U> {
         // Over a valid frame including its CRC or LRC, both CRC and sum are zero.
         let good = self.check == crc::GOOD && shortest <= len && len <= longest;
         if state & SPOILED != 0 || !good {
-            count(&mut self.counters.communication_errors);
+            if state & (FOLLOWS | QUIET) == 0 {
+                count(&mut self.counters.communication_errors);
+            }
             return None;
         }
         count(&mut self.counters.bus_messages);
-        if !self.takes(address) {
+        if self.units.is_fast() && self.is_fast_reply() || !self.takes(address) {
             return None;
         }
         if state & (TORN | UNKEPT) != 0 {
@@ -304,6 +372,9 @@ impl<'a, U: Units> Receiver<'a, U> {
         self.note(faults);
         self.check = crc::step(self.check, byte);
         self.keep_or_follow(byte);
+        if self.state & FOLLOWS != 0 {
+            self.seek_reply();
+        }
     }
 
     /// Processes a character in ASCII mode.
@@ -343,7 +414,7 @@ impl<'a, U: Units> Receiver<'a, U> {
 
     /// Starts a frame.
     fn begin(&mut self) {
-        self.state &= ASCII | UNKEPT;
+        self.state &= ASCII | UNKEPT | FOLLOWS | QUIET;
     }
 
     fn note(&mut self, faults: Faults) {

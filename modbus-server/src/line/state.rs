@@ -21,6 +21,11 @@ pub(super) const SPOILED: u16 = 1 << 9;
 pub(super) const OVERRUN: u16 = 1 << 10;
 /// No buffer was free when the frame started, so the frame is only followed. While idle: no buffer is free.
 pub(super) const UNKEPT: u16 = 1 << 11;
+/// In RTU mode, after a request of Fast Modbus, until its reply: the characters of an arbitration may be in front of the
+/// reply. No error is counted.
+pub(super) const FOLLOWS: u16 = 1 << 12;
+/// In RTU mode, after that reply until the next t3.5: no error is counted.
+pub(super) const QUIET: u16 = 1 << 13;
 
 // Shortest and longest frame in bytes, and the number of bytes of the checksum.
 

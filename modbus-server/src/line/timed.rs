@@ -67,8 +67,10 @@ impl<'a, U: Units> TimedPort<'a, U> {
 
     /// Processes a character that ended in tick `now`. Returns whether a request waits to be served.
     pub fn received(&mut self, byte: u8, faults: Faults, now: u32) -> bool {
-        let waits = self.poll(now);
-        self.port.received(byte, faults);
+        let mut waits = self.poll(now);
+        if self.port.received(byte, faults) {
+            waits |= self.port.ends_fast_message(now);
+        }
         self.since = Some(now);
         self.short_has_passed = false;
         waits

@@ -1,15 +1,60 @@
 //! The unit addresses of a line (V1.02 2.2).
 
-/// The unit addresses whose requests a [`Receiver`](super::Receiver) takes: a `u8` for a single one, or a [`UnitSet`].
+/// The unit addresses whose requests a [`Receiver`](super::Receiver) takes: a `u8` for a single one, a [`UnitSet`], or a
+/// [`FastUnit`].
 pub trait Units {
-    /// Returns whether requests to this unit address are taken. Broadcasts are always taken.
+    /// Lines can recognise messages of Fast Modbus ([`fast`](crate::fast)) at their last byte. Costs nothing when
+    /// `false`.
+    const FAST: bool = false;
+
+    /// Returns whether requests to this unit address are taken.
     fn contains(&self, unit: u8) -> bool;
+
+    /// Returns whether messages of Fast Modbus are recognised on this line.
+    fn is_fast(&self) -> bool {
+        Self::FAST
+    }
+
+    /// Returns whether broadcasts are taken.
+    fn takes_broadcasts(&self) -> bool {
+        true
+    }
 }
 
 impl Units for u8 {
     #[inline(always)]
     fn contains(&self, unit: u8) -> bool {
         *self == unit
+    }
+}
+
+/// The unit address of a unit that serves [Fast Modbus](crate::fast), on an RTU line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FastUnit {
+    /// `None` for a unit without an address. It takes requests to [`fast::ADDRESS`](crate::fast::ADDRESS) only, so that
+    /// it can be found.
+    pub unit: Option<u8>,
+    /// Whether messages of Fast Modbus are recognised, and requests to [`fast::ADDRESS`](crate::fast::ADDRESS) taken. Not
+    /// on an ASCII line.
+    pub is_fast: bool,
+}
+
+impl Units for FastUnit {
+    const FAST: bool = true;
+
+    #[inline(always)]
+    fn contains(&self, unit: u8) -> bool {
+        self.unit == Some(unit) || self.is_fast && unit == crate::fast::ADDRESS
+    }
+
+    #[inline(always)]
+    fn is_fast(&self) -> bool {
+        self.is_fast
+    }
+
+    #[inline(always)]
+    fn takes_broadcasts(&self) -> bool {
+        self.unit.is_some()
     }
 }
 

@@ -23,7 +23,7 @@ pub(super) enum Effect {
 
 /// Why a request is not executed.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Refusal {
+pub(crate) enum Refusal {
     Exception(Exception),
     /// It was a broadcast, and is valid for a single unit only.
     NotForAll,

@@ -6,8 +6,11 @@ mod tally;
 use crate::diagnostic::Diagnostic;
 use crate::events::EventLog;
 use crate::line::Framing;
-use crate::{Adu, BROADCAST, Counters, DataModel, Function, LineCounters, Outcome, Reply, Request};
-use execute::{Effect, Refusal, execute};
+use crate::{
+    Adu, BROADCAST, Counters, DataModel, Exception, Function, LineCounters, Outcome, Reply, Request,
+};
+pub(crate) use execute::Refusal;
+use execute::{Effect, execute};
 use tally::{Sent, Tally};
 
 /// The server of one line. It serves the requests that its [`Port`](crate::line::Port) has received, for one data
@@ -104,6 +107,20 @@ impl Server {
         }
     }
 
+    /// Counts a request to this unit and answers it with an exception.
+    pub(crate) fn refuse_at_once<'a>(&mut self, request: Request<'a>, why: Exception) -> Reply<'a> {
+        self.begin(&request.line, false, true);
+        let outcome = refuse(request.adu, why.into());
+        self.end(Err(outcome), true);
+        Reply {
+            adu: request.adu,
+            is_answered: true,
+            framing: self.framing,
+            outcome,
+            writes: false,
+        }
+    }
+
     /// Returns the outcome of a request that is not executed, whatever the model says.
     #[inline]
     fn dismissed(&self, request: &Adu) -> Option<Outcome> {
@@ -158,7 +175,7 @@ impl Server {
 
 /// Makes a request that is refused an exception.
 #[inline(never)]
-fn refuse(adu: &mut Adu, refusal: Refusal) -> Outcome {
+pub(crate) fn refuse(adu: &mut Adu, refusal: Refusal) -> Outcome {
     let Refusal::Exception(exception) = refusal else {
         return Outcome::NoEffect;
     };

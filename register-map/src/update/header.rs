@@ -13,8 +13,6 @@
 //! | 156 | 4 | first bytes of the SHA-512 of the public key |
 //! | 160 | 352 | zero |
 
-use crc::{CRC_32_MPEG_2, Crc, NoTable};
-
 use super::{BLOCK_BYTES, Reason};
 
 /// Bytes of the header.
@@ -55,7 +53,8 @@ impl<'a> Header<'a> {
     }
 
     fn array<const N: usize>(&self, at: usize) -> [u8; N] {
-        core::array::from_fn(|n| self.0.get(at + n).copied().unwrap_or_default())
+        let rest = self.0.get(at..).unwrap_or_default();
+        rest.first_chunk().copied().unwrap_or([0; N])
     }
 
     /// Returns the board's code.
@@ -182,14 +181,18 @@ impl<'a> Header<'a> {
 /// (RM0008 4).
 #[must_use]
 pub fn crc32(parts: [&[u8]; 2]) -> u32 {
-    const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_MPEG_2);
-    let mut digest = CRC.digest();
-    for word in parts.into_iter().flat_map(|part| part.as_chunks::<4>().0) {
-        // The unit takes the highest bit of a word first.
-        let [a, b, c, d] = *word;
-        digest.update(&[d, c, b, a]);
-    }
-    digest.finalize()
+    parts.into_iter().fold(u32::MAX, |crc, part| {
+        let words = part.as_chunks().0.iter().copied();
+        words.map(u32::from_le_bytes).fold(crc, crc_of_word)
+    })
+}
+
+/// Adds a word to a CRC-32, from its highest bit on: CRC-32/MPEG-2.
+fn crc_of_word(crc: u32, word: u32) -> u32 {
+    (0..32).fold(crc ^ word, |crc, _| {
+        let out = if crc >> 31 == 0 { 0 } else { 0x04C1_1DB7 };
+        crc << 1 ^ out
+    })
 }
 
 /// Returns the header of an image whose magic number, bounds, zero bytes and CRC-32 are right. `crc` computes the

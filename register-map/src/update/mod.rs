@@ -57,18 +57,21 @@ pub enum Reason {
 }
 
 impl Reason {
-    const ALL: [Self; 10] = [
-        Self::Magic,
-        Self::Board,
-        Self::Address,
-        Self::Length,
-        Self::Epoch,
-        Self::Crc,
-        Self::Hash,
-        Self::Signature,
-        Self::Interrupted,
-        Self::NotConfirmed,
-    ];
+    const fn from_code(code: u8) -> Option<Self> {
+        Some(match code {
+            1 => Self::Magic,
+            2 => Self::Board,
+            3 => Self::Address,
+            4 => Self::Length,
+            5 => Self::Epoch,
+            6 => Self::Crc,
+            7 => Self::Hash,
+            8 => Self::Signature,
+            9 => Self::Interrupted,
+            10 => Self::NotConfirmed,
+            _ => return None,
+        })
+    }
 }
 
 /// First bytes of the SHA-512 of the public development key, whose private half everybody has.
@@ -121,10 +124,7 @@ impl State {
             (3, 0) => Self::Checking,
             (4, starts @ 0..=TRIALS) => Self::Trial(starts),
             (5, 0) => Self::Confirmed,
-            (6, code) => {
-                let mut reasons = Reason::ALL.into_iter();
-                Self::Rejected(reasons.find(|reason| *reason as u8 == code)?)
-            }
+            (6, code) => Self::Rejected(Reason::from_code(code)?),
             _ => return None,
         })
     }

@@ -41,7 +41,7 @@ fn every_setting_takes_the_ends_of_its_range_and_nothing_beyond() {
             let (inside, outside) = ends(match is_port && address != MODULE_SLOT {
                 // A port without a slot cannot have a module.
                 true => Values::only(0),
-                false => rule.values_for(kind.copied().unwrap_or(Kind::None)),
+                false => *rule.values_for(kind.copied().unwrap_or(Kind::None)),
             });
             for value in inside {
                 assert_eq!(

@@ -10,7 +10,7 @@ mod points;
 mod state;
 mod updating;
 
-use std::vec::Vec;
+use std::{boxed::Box, vec::Vec};
 
 use modbus_server::line::{Faults, Framing, Port, Receiver};
 use modbus_server::{Adu, Server, crc};
@@ -24,7 +24,7 @@ use crate::config::Settings;
 
 /// A device with these modules in its slots, these stored settings, and a server.
 struct Bench<const SLOTS: usize = 1> {
-    device: Device<SLOTS>,
+    device: &'static mut Device<SLOTS>,
     server: Server,
 }
 
@@ -47,17 +47,21 @@ impl<const SLOTS: usize> Bench<SLOTS> {
             unique_id: [1, 2, 3, 4, 5, 6],
             fault: [3; 16],
             internal_oscillator: false,
+            serial_number: 0x0D00_1234,
+            reports_events: true,
             build: 0,
         };
-        let description = if *board == MODIO_02 {
-            const { &Fixed::of(&MODIO_02) }
-        } else {
-            const { &Fixed::of(&MODIO_08) }
-        };
-        let mut device = Device::new(Config::new(board, settings, false), identity, description);
-        device.start();
         Self {
-            device,
+            device: Device::new_in(
+                Box::leak(Box::new_uninit()),
+                Config::new(board, settings, false),
+                identity,
+                if *board == MODIO_02 {
+                    const { &Fixed::of(&MODIO_02) }
+                } else {
+                    const { &Fixed::of(&MODIO_08) }
+                },
+            ),
             server: Server::new(Framing::Rtu),
         }
     }
@@ -74,7 +78,7 @@ impl<const SLOTS: usize> Bench<SLOTS> {
         }
         assert!(port.long_silence(0));
         let request = port.take().expect("a request waits");
-        let reply = self.server.serve(request, &mut self.device);
+        let reply = self.server.serve(request, self.device);
         port.send(reply, 0);
         if let Some(order) = self.device.end_request() {
             self.device.carry_out(order, LineName::Rs485);

@@ -277,7 +277,7 @@ fn comm_source_selects_the_requests_that_restart_the_communication_watchdog() {
             .into_iter()
             .flat_map(|line| [(line, false), (line, true)]);
         for ((line, writes), restarts) in requests.zip(expected) {
-            let mut bench = Bench::new(Module::Do4, &settings);
+            let bench = Bench::new(Module::Do4, &settings);
             bench.device.set_origin(Origin {
                 line,
                 broadcast: false,

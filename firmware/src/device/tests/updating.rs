@@ -17,7 +17,7 @@ const CODES: [u16; 5] = [PREPARE, 0xB002, CONFIRM, 0xB004, AS_255];
 
 /// Returns a unit with an image in this state in slot A, from which it runs.
 fn bench(own: OfSlot, lora: u16) -> Bench {
-    let mut bench = Bench::new(Module::Di4, &[(at::LORA, lora)]);
+    let bench = Bench::new(Module::Di4, &[(at::LORA, lora)]);
     let record = Record {
         preferred: Slot::A,
         states: [own, OfSlot::Empty],
@@ -120,7 +120,7 @@ fn preparation_over_the_air_needs_a_radio_with_settings() {
 #[test]
 fn image_that_nobody_confirms_restarts_after_15_minutes() {
     for (own, restarts) in [(OfSlot::Trial(1), true), (OfSlot::Confirmed, false)] {
-        let mut bench = bench(own, 0);
+        let bench = bench(own, 0);
         bench.device.tick(TRIAL_S * 1000 - 1);
         assert_eq!(bench.device.restart, None);
         bench.device.tick(1);

@@ -32,6 +32,8 @@ mod bench;
 mod boot;
 #[path = "../image/campaign.rs"]
 mod campaign;
+#[path = "../image/fast.rs"]
+mod fast;
 #[allow(dead_code, reason = "other tests of the modio-02 use the rest")]
 #[path = "../image/in_slots.rs"]
 mod in_slots;

@@ -1,0 +1,185 @@
+//! The events of function 70: what has changed and is to be reported.
+//!
+//! Edges of digital inputs wait in order. For outputs and words only the last value is reported, so a mark is enough for
+//! each. What a master switches on is not stored: it is off after a start.
+
+use heapless::Deque;
+use modbus_server::fast::{Kind as EventKind, Packet, Setting, Waiting};
+use modio_drivers::{CHANNELS, Kind};
+
+use super::port::IoPort;
+
+/// Number of edges that can wait.
+const EDGES: usize = 32;
+/// Time between two looks at words, in ms: a point has at most ten events in a second.
+const WORDS_MS: u32 = 100;
+/// Id of the event that edges were lost because too many waited. The state of each point follows.
+const EDGES_LOST: u16 = 1;
+
+/// The new level of a waiting edge. The index of the point is below it.
+const LEVEL: u8 = 1 << 7;
+
+/// What waits to be reported, of the points of `SLOTS` ports.
+#[derive(Debug)]
+pub struct Events<const SLOTS: usize> {
+    ports: [PortEvents; SLOTS],
+    edges: Deque<u8, EDGES>,
+    /// Edges were lost.
+    lost: bool,
+    /// The start is reported.
+    started: bool,
+}
+
+/// The events of one port. Each byte is a set of channels, channel 1 in bit 0.
+#[derive(Clone, Copy, Debug, Default)]
+struct PortEvents {
+    on: u8,
+    high: u8,
+    /// The state is to be reported.
+    due: u8,
+    /// Values as last reported.
+    reported: [u16; CHANNELS],
+}
+
+impl<const SLOTS: usize> Events<SLOTS> {
+    /// Returns nothing but the start of the unit.
+    pub fn new() -> Self {
+        Self {
+            ports: [PortEvents::default(); SLOTS],
+            edges: Deque::new(),
+            lost: false,
+            started: true,
+        }
+    }
+
+    /// Adds an edge of a digital input, given the index of its slot, its channel and the new level.
+    pub fn edge(&mut self, slot: usize, channel: usize, level: bool) {
+        let port = self.ports.get(slot);
+        // A state that is to be reported includes the edge.
+        if self.lost || port.is_none_or(|port| port.on & !port.due & (1 << channel) == 0) {
+            return;
+        }
+        let edge = (slot * CHANNELS + channel) as u8 | if level { LEVEL } else { 0 };
+        self.lost = self.edges.push_back(edge).is_err();
+    }
+
+    /// Looks for changes of outputs, and of words every [`WORDS_MS`].
+    pub fn look(&mut self, slot: usize, port: &IoPort, now_ms: u32) {
+        let Some(own) = self.ports.get_mut(slot).filter(|own| own.on != 0) else {
+            return;
+        };
+        let words = now_ms.is_multiple_of(WORDS_MS);
+        for (channel, before) in own.reported.into_iter().enumerate() {
+            let smallest = match port.kind(channel) {
+                Kind::BitOutput => 1,
+                Kind::WordInput | Kind::WordOutput if words => port.deadband(channel),
+                _ => continue,
+            };
+            // Also across 0, where a temperature changes its sign.
+            let change = port.value(channel).wrapping_sub(before).cast_signed();
+            if change.unsigned_abs() >= smallest {
+                own.due |= 1 << channel & own.on;
+            }
+        }
+    }
+
+    /// Switches the events of a point on or off: id and kind as in the request. Returns whether they are on.
+    #[inline(never)]
+    pub fn set(&mut self, ports: &[IoPort], first: u16, kind: u8, id: u16, to: Setting) -> bool {
+        let on = to != Setting::Off;
+        if kind == EventKind::Unit as u8 && id == EventKind::STARTED {
+            self.started = on;
+            return on;
+        }
+        let index = usize::from(id.wrapping_sub(first));
+        let (slot, channel) = (index / CHANNELS, index % CHANNELS);
+        let (Some(own), Some(port)) = (self.ports.get_mut(slot), ports.get(slot)) else {
+            return false;
+        };
+        if kind_of(port, channel).is_none_or(|own| own as u8 != kind) {
+            return false;
+        }
+        let bit = 1 << channel;
+        for (set, on) in [
+            (&mut own.on, on),
+            (&mut own.due, on),
+            (&mut own.high, to == Setting::High),
+        ] {
+            *set = *set & !bit | if on { bit } else { 0 };
+        }
+        on
+    }
+
+    /// Returns what waits.
+    #[inline(never)]
+    pub fn waiting(&self) -> Waiting {
+        let mut count = self.edges.len() + usize::from(self.lost);
+        let mut is_high = false;
+        for port in &self.ports {
+            count += port.due.count_ones() as usize;
+            is_high |= port.due & port.high != 0;
+        }
+        for edge in &self.edges {
+            let index = usize::from(edge & !LEVEL);
+            let port = self.ports.get(index / CHANNELS);
+            is_high |= port.is_some_and(|port| port.high >> (index % CHANNELS) & 1 != 0);
+        }
+        Waiting {
+            // At most 32 edges, 1 and 32 points.
+            count: count as u8,
+            is_high,
+        }
+    }
+
+    /// Returns whether the start of the unit is reported.
+    pub const fn reports_start(&self) -> bool {
+        self.started
+    }
+
+    /// Moves events into a packet: first the edges, in order, then the states of points.
+    #[inline(never)]
+    pub fn fill(&mut self, packet: &mut Packet, ports: &[IoPort], first: u16) {
+        while let Some(edge) = self.edges.front() {
+            let id = first.wrapping_add((edge & !LEVEL).into());
+            if !packet.push(EventKind::DiscreteInput, id, (edge >> 7).into()) {
+                return;
+            }
+            self.edges.pop_front();
+        }
+        if self.lost {
+            if !packet.push(EventKind::Unit, EDGES_LOST, 0) {
+                return;
+            }
+            self.lost = false;
+            self.ports.iter_mut().for_each(|port| port.due = port.on);
+        }
+        let mut id = first;
+        for (own, port) in self.ports.iter_mut().zip(ports) {
+            for (channel, reported) in own.reported.iter_mut().enumerate() {
+                let bit = 1 << channel;
+                if own.due & bit != 0
+                    && let Some(kind) = kind_of(port, channel)
+                {
+                    let value = port.value(channel);
+                    if !packet.push(kind, id, value) {
+                        return;
+                    }
+                    own.due &= !bit;
+                    *reported = value;
+                }
+                id = id.wrapping_add(1);
+            }
+        }
+    }
+}
+
+/// Returns the kind of a channel's events.
+fn kind_of(port: &IoPort, channel: usize) -> Option<EventKind> {
+    match port.kind(channel) {
+        Kind::None => None,
+        Kind::BitInput => Some(EventKind::DiscreteInput),
+        Kind::BitOutput => Some(EventKind::Coil),
+        Kind::WordInput => Some(EventKind::InputRegister),
+        Kind::WordOutput => Some(EventKind::HoldingRegister),
+    }
+}

@@ -1,0 +1,259 @@
+//! A unit's part in scans and in the reports of events.
+
+use super::{ADDRESS, EventSource, FUNCTION, Kind, Packet, SERIAL_AHEAD, sub};
+use crate::server::refuse;
+use crate::{Adu, DataModel, Exception, Function, Outcome, Reply, Request, Server};
+
+/// Bits in front of the serial number of a unit that was not found yet, and of one that was.
+const NOT_FOUND: u32 = 0b0110 << 28;
+const FOUND: u32 = 0b1111 << 28;
+/// Bits in front of the unit address: events of high and low priority, events of a unit that lets others go first, no
+/// events.
+const HIGH: u32 = 0b1000 << 8;
+const LOW: u32 = 0b1001 << 8;
+const YIELDING: u32 = 0b1110 << 8;
+const NO_EVENTS: u32 = 0b1111 << 8;
+/// Number of packets in a row after which others go first once.
+const IN_A_ROW: u8 = 2;
+/// Largest number of words that function 17 can return inside sub-function 09: 256 bytes less 7 in front, 2 of function
+/// and byte count, and 2 of the CRC are 245.
+const MAX_WORDS: u16 = 122;
+
+/// What a unit takes part in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// Scans, requests by serial number, and events.
+    Everything,
+    /// Scans and requests by serial number: the unit has no address of its own.
+    NoEvents,
+    /// Scans only.
+    Scans,
+    /// Requests by serial number only: the unit's clock is not accurate enough to arbitrate.
+    Requests,
+}
+
+/// A unit of Fast Modbus: its serial number, whether it was found, and the events that were reported last.
+#[derive(Debug)]
+pub struct Unit {
+    serial: u32,
+    address: u8,
+    part: Part,
+    is_found: bool,
+    /// Number of packets that were sent in a row.
+    in_a_row: u8,
+    packet: Packet,
+    /// What the reply means that was sent if the unit has won.
+    contended: Contended,
+}
+
+/// What the unit arbitrated for last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Contended {
+    Nothing,
+    ToBeFound,
+    Packet,
+}
+
+/// The bits with which a reply takes part in an arbitration, for [`Port::arbitrate`](crate::line::Port::arbitrate).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Contest {
+    /// The value, in the lowest bits.
+    pub value: u32,
+    /// Number of bits, each of which has a window: 0 to 32.
+    pub windows: u8,
+}
+
+impl Unit {
+    /// Creates a unit that has just started, with its unit address, or 0 for a unit without one.
+    #[must_use]
+    pub const fn new(serial: u32, address: u8, part: Part) -> Self {
+        Self {
+            serial,
+            address,
+            part,
+            is_found: false,
+            in_a_row: 0,
+            packet: Packet::new(),
+            contended: Contended::Nothing,
+        }
+    }
+
+    /// Notes whether the unit has won its last arbitration.
+    fn end_contest(&mut self, won: bool) {
+        let contended = core::mem::replace(&mut self.contended, Contended::Nothing);
+        match contended {
+            Contended::ToBeFound if won => self.is_found = true,
+            Contended::Packet if won => {
+                self.packet.was_sent = true;
+                self.in_a_row += 1;
+            }
+            Contended::Packet => self.in_a_row = 0,
+            _ => {}
+        }
+    }
+
+    /// Makes a request to start or to continue a scan the reply.
+    fn scan(&mut self, adu: &mut Adu) -> Contest {
+        let mark = if self.is_found {
+            adu.set(2, sub::NONE_LEFT);
+            FOUND
+        } else {
+            adu.set(2, sub::FOUND);
+            adu.extend(&self.serial.to_be_bytes());
+            adu.extend(&[self.address]);
+            self.contended = Contended::ToBeFound;
+            NOT_FOUND
+        };
+        Contest {
+            value: mark | self.serial & 0x0FFF_FFFF,
+            windows: 32,
+        }
+    }
+
+    /// Makes a request for events the reply. Returns `None` if the unit is not asked.
+    fn fetch(&mut self, adu: &mut Adu, source: &mut impl EventSource) -> Option<Contest> {
+        let (least, room, confirmed, flag) = (adu.get(3), adu.get(4), adu.get(5), adu.get(6));
+        if confirmed == self.address && flag == self.packet.flag && self.packet.was_sent {
+            self.packet.clear(0);
+        }
+        if self.address < least {
+            return None;
+        }
+        let waiting = source.waiting();
+        let has_events = waiting.count > 0 || source.reports_start() || !self.packet.is_empty();
+        adu.truncate(2);
+        if !has_events {
+            adu.extend(&[sub::NO_EVENTS]);
+            self.in_a_row = 0;
+            return Some(self.contest(NO_EVENTS));
+        }
+        let is_high = waiting.is_high || self.packet.is_high && !self.packet.is_empty();
+        if self.packet.is_empty() {
+            self.packet.clear(room);
+            self.packet.is_high = waiting.is_high;
+            if source.reports_start() {
+                self.packet.push(Kind::Unit, Kind::STARTED, 0);
+            }
+            source.fill(&mut self.packet);
+            self.packet.number = self.packet.number.saturating_add(source.waiting().count);
+            if !self.packet.is_empty() {
+                self.packet.flag ^= 1;
+            }
+        }
+        adu.set(0, self.address);
+        adu.extend(&[sub::EVENTS]);
+        self.packet.append_to(adu);
+        self.contended = Contended::Packet;
+        let priority = if self.in_a_row >= IN_A_ROW {
+            self.in_a_row = 0;
+            YIELDING
+        } else if is_high {
+            HIGH
+        } else {
+            LOW
+        };
+        Some(self.contest(priority))
+    }
+
+    fn contest(&self, priority: u32) -> Contest {
+        Contest {
+            value: priority | u32::from(self.address),
+            windows: 12,
+        }
+    }
+}
+
+impl Server {
+    /// Serves a request to [`ADDRESS`], of the same line, and makes its buffer the reply. Returns the reply, and with
+    /// which bits it takes part in the arbitration.
+    ///
+    /// Requests that the unit does not take part in have no reply, as all others that it does not know.
+    pub fn serve_fast<'a, M: DataModel + EventSource>(
+        &mut self,
+        request: Request<'a>,
+        unit: &mut Unit,
+        model: &mut M,
+    ) -> (Reply<'a>, Contest) {
+        unit.end_contest(request.won);
+        let adu = &mut *request.adu;
+        let arbitrates = unit.part != Part::Requests;
+        let mut outcome = Outcome::NoEffect;
+        let is_fast = adu.get(1) == FUNCTION;
+        let contest = match (adu.get(2), adu.len()) {
+            _ if self.is_listen_only() => {
+                outcome = Outcome::NotObeyed;
+                None
+            }
+            (sub::REQUEST, 8..)
+                if adu.from(3).starts_with(&unit.serial.to_be_bytes())
+                    && is_fast
+                    && unit.part != Part::Scans =>
+            {
+                let reply = self.serve_by_serial(request, unit, model);
+                return (reply, Contest::default());
+            }
+            (sub::START_SCAN, 3) if is_fast => {
+                unit.is_found = false;
+                arbitrates.then(|| unit.scan(adu))
+            }
+            (sub::CONTINUE_SCAN, 3) if is_fast => arbitrates.then(|| unit.scan(adu)),
+            (sub::FETCH, 7) if is_fast => {
+                let takes_part = unit.part == Part::Everything;
+                takes_part.then(|| unit.fetch(adu, model)).flatten()
+            }
+            _ => {
+                outcome = Outcome::NoRequest;
+                None
+            }
+        };
+        let reply = Reply {
+            adu: request.adu,
+            is_answered: contest.is_some(),
+            framing: self.framing(),
+            outcome,
+            writes: false,
+        };
+        (reply, contest.unwrap_or_default())
+    }
+
+    /// Serves the request inside a request to the unit's serial number.
+    fn serve_by_serial<'a>(
+        &mut self,
+        request: Request<'a>,
+        unit: &Unit,
+        model: &mut impl DataModel,
+    ) -> Reply<'a> {
+        let adu = &mut *request.adu;
+        adu.drop_front(SERIAL_AHEAD);
+        // Not the address of a broadcast, also for a unit without an address.
+        adu.set(0, ADDRESS);
+        let refusal = match adu.get(1) {
+            code if code == Function::Diagnostics.code() || code == FUNCTION => {
+                Some(Exception::IllegalFunction)
+            }
+            code if code == Function::ReadWriteMultipleRegisters.code()
+                && u16::from_be_bytes([adu.get(4), adu.get(5)]) > MAX_WORDS =>
+            {
+                Some(Exception::IllegalDataValue)
+            }
+            _ => None,
+        };
+        let mut reply = match refusal {
+            Some(exception) => self.refuse_at_once(request, exception),
+            None => self.serve(request, model),
+        };
+        if reply.is_answered {
+            let adu = &mut *reply.adu;
+            if !adu.add_front(SERIAL_AHEAD) {
+                // It read something, because 17 was refused and all other replies are no longer than their requests.
+                reply.outcome = refuse(adu, Exception::IllegalDataValue.into());
+                adu.add_front(SERIAL_AHEAD);
+            }
+            let head = [ADDRESS, FUNCTION, sub::REPLY].into_iter();
+            for (at, byte) in (0..).zip(head.chain(unit.serial.to_be_bytes())) {
+                adu.set(at, byte);
+            }
+        }
+        reply
+    }
+}

@@ -1,0 +1,217 @@
+//! Function 70 on a bus: units arbitrate with real start bits, different crystals and late interrupts.
+
+use register_map::codes::Baud;
+use register_map::configuration::{BAUD, FORMAT};
+use sim::line::Settings;
+use sim::{Board, Bus, Config, Module, Time};
+
+use crate::LAYOUT;
+use crate::bench::{FIRST, PORT, adu, config, corner, crc, format, image};
+
+/// A bus with a master that knows function 70.
+struct Master {
+    bus: Bus,
+    settings: Settings,
+}
+
+/// A unit: its switch and the error of its crystal in ppm; `None` without a crystal.
+type Unit = (u8, Option<i32>);
+
+impl Master {
+    /// Returns a bus with these units, with time to start.
+    fn new(baud: Baud, format_code: u16, units: &[Unit]) -> Self {
+        let boards = units.iter().zip(0..).map(|(unit, n)| {
+            let stored = [(BAUD, baud.code()), (FORMAT, format_code)];
+            board(*unit, n, &stored)
+        });
+        let mut bus = Bus::new(boards.collect());
+        let settings = Settings {
+            baud: baud.bits_per_second(),
+            format: format(format_code),
+        };
+        bus.line().set_settings(settings);
+        bus.run_for(Time::from_ms(300));
+        Self { bus, settings }
+    }
+
+    /// Sends a request without its CRC. Returns the reply without its CRC, and what was received in front of it.
+    fn ask(&mut self, request: &[u8], windows: u64) -> Option<(Vec<u8>, Vec<u8>)> {
+        let now = self.bus.now();
+        let end = self.bus.line().send(now, &adu(request));
+        let bits = |n| self.settings.rate().bits(n);
+        let window = bits(13) + Time::from_us(50);
+        let start = bits(39).max(bits(12) + Time::from_us(800));
+        let arbitration = start + Time::from_ps(window.as_ps() * windows);
+        let reply = self.settings.characters(72) + Time::from_ms(2);
+        self.bus.run_until(end + arbitration + reply);
+        let received = self.bus.line().take_received();
+        let bytes: Vec<u8> = received.iter().map(|received| received.byte).collect();
+        // The reply is the shortest end of what was received with a valid CRC.
+        let at = (0..bytes.len().checked_sub(4)?).rev().find(|at| {
+            let (body, sum) = bytes[*at..].split_at(bytes.len() - at - 2);
+            crc(body) == sum
+        })?;
+        Some((bytes[at..bytes.len() - 2].to_vec(), bytes[..at].to_vec()))
+    }
+
+    fn scan(&mut self, start: bool) -> Option<Vec<u8>> {
+        let request = [0xFD, 0x46, if start { 1 } else { 2 }];
+        self.ask(&request, 32).map(|(reply, _)| reply)
+    }
+
+    /// Scans the bus. Returns the serial numbers and addresses in the order in which they were found.
+    fn find_all(&mut self) -> Vec<(u32, u8)> {
+        let mut found = Vec::new();
+        let mut reply = self.scan(true).expect("a reply");
+        while let [0xFD, 0x46, 3, a, b, c, d, unit] = reply[..] {
+            found.push((u32::from_be_bytes([a, b, c, d]), unit));
+            reply = self.scan(false).expect("a reply");
+        }
+        assert_eq!(reply, [0xFD, 0x46, 4]);
+        found
+    }
+
+    fn fetch(&mut self, confirmed: u8, flag: u8) -> Vec<u8> {
+        let request = [0xFD, 0x46, 0x10, 0, 100, confirmed, flag];
+        self.ask(&request, 12).expect("a reply").0
+    }
+}
+
+fn board((dip, ppm): Unit, n: u8, stored: &[(u16, u16)]) -> Board {
+    let mut config = Config {
+        dip,
+        layout: LAYOUT,
+        ..config(Module::Di4, stored)
+    };
+    config.chip.corner = corner();
+    config.chip.unique_id[11] = n;
+    match ppm {
+        Some(ppm) => config.chip.crystal_hz = (8_000_000 + 8 * ppm) as u32,
+        None => config.chip.crystal = false,
+    }
+    Board::new(image(), config).expect("the image fits")
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_scan_finds_every_unit_once_also_two_with_one_address() {
+    let units = [
+        (17, Some(200)),
+        (5, Some(-200)),
+        (17, Some(0)),
+        (200, Some(-100)),
+        (0, Some(150)),
+    ];
+    for (baud, format) in [
+        (Baud::B1200, 0),
+        (Baud::B9600, 0),
+        (Baud::B19200, 3),
+        (Baud::B115200, 0),
+        (Baud::B230400, 2),
+        (Baud::B921600, 0),
+        (Baud::B921600, 1),
+    ] {
+        let mut master = Master::new(baud, format, &units);
+        let found = master.find_all();
+        let mut sorted = found.clone();
+        sorted.sort_unstable();
+        assert_eq!(
+            found, sorted,
+            "the lowest serial number comes first: {baud:?}"
+        );
+        let mut addresses: Vec<u8> = found.iter().map(|(_, unit)| *unit).collect();
+        addresses.sort_unstable();
+        assert_eq!(addresses, [0, 5, 17, 17, 200], "{baud:?}");
+        // Each is reached by its serial number.
+        for (serial, unit) in found {
+            let request = [
+                &[0xFD, 0x46, 8],
+                &serial.to_be_bytes()[..],
+                &[3, 2, 6, 0, 1],
+            ]
+            .concat();
+            let (reply, _) = master.ask(&request, 0).expect("a reply");
+            assert_eq!(reply[..3], [0xFD, 0x46, 9]);
+            assert_eq!(reply[7..], [3, 2, 0, unit]);
+        }
+    }
+}
+
+/// Changes input `channel` (1 to 4) of unit `n` on the bus.
+fn set_input(master: &mut Master, n: usize, channel: usize, on: bool) {
+    let board = master.bus.board_mut(n);
+    let change = board.change_slot(PORT as u8, |slot| slot.set_energised(channel, on));
+    change.expect("the port has a slot").expect("an input");
+}
+
+/// Switches the report of the start off and the events of the inputs of a unit on: 1 low, 2 high priority.
+fn switch_on(master: &mut Master, unit: u8, setting: u8) {
+    let mut request = vec![unit, 0x46, 0x18, 13, 0x0F, 0, 0, 1, 0, 2, 0, FIRST, 4];
+    request.extend([setting; 4]);
+    let (reply, _) = master.ask(&request, 0).expect("a reply");
+    assert_eq!(reply, [unit, 0x46, 0x18, 2, 0, 0b1111]);
+}
+
+/// Fetches until nobody has events. Returns unit, number of the input and level of each event.
+fn fetch_all(master: &mut Master) -> Vec<(u8, u8, u8)> {
+    let (mut events, mut last) = (Vec::new(), (0, 0));
+    loop {
+        let reply = master.fetch(last.0, last.1);
+        let [unit, 0x46, 0x11, flag, _, _, packet @ ..] = &reply[..] else {
+            assert_eq!(reply, [0xFD, 0x46, 0x12]);
+            return events;
+        };
+        last = (*unit, *flag);
+        // The packet with the start, which was not confirmed, is sent again.
+        for event in packet.chunks(5).filter(|event| *event != [0, 0x0F, 0, 0]) {
+            let [1, 2, 0, id, level] = event else {
+                panic!("{packet:02X?}");
+            };
+            events.push((*unit, id - FIRST + 1, *level));
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn events_come_from_the_unit_that_has_them_high_ones_first() {
+    // The last one has no crystal: it takes no part, and does not disturb the others.
+    let units = [(1, Some(-200)), (2, Some(200)), (247, Some(0)), (3, None)];
+    for (baud, format) in [(Baud::B9600, 0), (Baud::B115200, 1), (Baud::B921600, 0)] {
+        let mut master = Master::new(baud, format, &units);
+        // Each unit reports its start first.
+        assert_eq!(master.fetch(0, 0), [1, 0x46, 0x11, 0, 1, 4, 0, 0x0F, 0, 0]);
+        for (unit, setting) in [(1, 1), (2, 2), (247, 1), (3, 2)] {
+            switch_on(&mut master, unit, setting);
+        }
+        let states = fetch_all(&mut master);
+        let all = |units: &[u8]| -> Vec<_> {
+            units
+                .iter()
+                .flat_map(|unit| (1..=4).map(|n| (*unit, n, 0)))
+                .collect()
+        };
+        assert_eq!(states, all(&[2, 1, 247]), "{baud:?}");
+        for _ in 0..2 {
+            assert_eq!(fetch_all(&mut master), []);
+        }
+        for level in [1, 0] {
+            for n in 0..4 {
+                set_input(&mut master, n, 2, level == 1);
+            }
+            master.bus.run_for(Time::from_ms(20));
+            let expected = [2, 1, 247].map(|unit| (unit, 2, level));
+            assert_eq!(fetch_all(&mut master), expected, "{baud:?}");
+            // A master that knows nothing of it polls between.
+            for unit in [1, 2, 3, 247] {
+                let (reply, _) = master.ask(&[unit, 2, 0, FIRST, 0, 4], 0).expect("a reply");
+                assert_eq!(reply, [unit, 2, 1, level << 1], "{baud:?}");
+            }
+        }
+        // No error was counted, also by the unit that takes no part.
+        for unit in [1, 2, 3, 247] {
+            let (reply, _) = master.ask(&[unit, 4, 2, 0x31, 0, 1], 0).expect("a reply");
+            assert_eq!(reply, [unit, 4, 2, 0, 0], "{baud:?}");
+        }
+    }
+}
