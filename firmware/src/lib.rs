@@ -4,6 +4,9 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+/// The device serves function 70.
+pub const HAS_EVENTS: bool = !cfg!(feature = "small");
+
 pub mod alive;
 mod built;
 pub mod byte_queue;

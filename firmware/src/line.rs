@@ -4,18 +4,41 @@
 //! runs from RAM, so that it continues while flash is erased or programmed. Functions that are called from here must be
 //! in RAM, too (`board-support/memory/sections.x`).
 
+use crate::HAS_EVENTS;
 use board_support::line::{GapTimer, Silence, Uart};
 use modbus_server::{
     LineCounters, Reply, Request,
     fast::Contest,
-    line::{Arbitration, FastUnit, Faults, Port, Turn, Windows},
+    line::{Arbitration, Faults, Port, Turn, Windows},
 };
+
+/// The unit addresses of a line. Both lines have the same type, so that they share their code.
+#[cfg(not(feature = "small"))]
+pub type Units = modbus_server::line::FastUnit;
+/// The unit address of a line.
+#[cfg(feature = "small")]
+pub type Units = u8;
+
+/// Returns the addresses of a line, or `None` if it is not served. `is_fast`: it serves function 70, by which a unit
+/// without an address can be found.
+#[must_use]
+#[cfg(not(feature = "small"))]
+pub fn units(unit: Option<u8>, is_fast: bool) -> Option<Units> {
+    (unit.is_some() || is_fast).then_some(Units { unit, is_fast })
+}
+
+/// Returns the address of a line, or `None` if it is not served.
+#[must_use]
+#[cfg(feature = "small")]
+pub const fn units(unit: Option<u8>, _is_fast: bool) -> Option<Units> {
+    unit
+}
 
 /// A line in use.
 pub struct Line<U, G> {
     uart: U,
     gap: G,
-    port: Port<'static, FastUnit>,
+    port: Port<'static, Units>,
     /// Times of an arbitration, and the end of the last request of Fast Modbus.
     windows: Windows,
     ended: Option<u32>,
@@ -35,7 +58,7 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
     pub fn new(
         uart: U,
         mut gap: G,
-        port: Port<'static, FastUnit>,
+        port: Port<'static, Units>,
         windows: Windows,
         longest_ms: u16,
     ) -> Self {
@@ -69,7 +92,7 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         if U::received(status) {
             let character = self.uart.read(status);
             let faults = Faults::from_bits(character.faults);
-            if self.port.received(character.byte, faults) {
+            if self.port.received(character.byte, faults) && HAS_EVENTS {
                 waits = self.on_special(character.byte, now_ms());
             }
             self.gap.restart();
@@ -113,7 +136,7 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
 
     /// Returns whether the line's registers change: a reply is being sent, or the unit arbitrates.
     pub fn is_sending(&self) -> bool {
-        self.port.is_sending() || self.port.is_arbitrating()
+        self.port.is_sending() || HAS_EVENTS && self.port.is_arbitrating()
     }
 
     /// Returns whether a reply has not taken too long, or the driver is off and the end of a frame is measured. An event
@@ -154,7 +177,7 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         if alarms.limit && self.port.is_sending() {
             self.repair();
         }
-        if alarms.wake {
+        if HAS_EVENTS && alarms.wake {
             self.take_turn();
         }
     }

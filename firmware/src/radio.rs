@@ -13,17 +13,17 @@ use embedded_hal::digital::{InputPin, OutputPin};
 use embedded_hal_nb::serial::{Read, Write};
 use modbus_server::{
     Adu, LineCounters, Reply, Request,
-    line::{FastUnit, Faults, Port, Receiver},
+    line::{Faults, Port, Receiver},
 };
 use modio_drivers::Lora;
 
 use crate::config::RadioConfig;
+use crate::line::Units;
 
 /// The radio line.
 pub struct RadioLine<S, M, A> {
     radio: Lora<S, M, A>,
-    /// Of the same type as that of the RS-485 line, so that both share their code.
-    port: Port<'static, FastUnit>,
+    port: Port<'static, Units>,
     /// Silence that ends a frame that is not complete, in milliseconds.
     frame_gap_ms: u16,
     /// Time since the last byte, in milliseconds, until it has reached the frame gap.
@@ -67,15 +67,11 @@ where
             module,
             frame_gap_ms,
         }: RadioConfig,
-        unit: u8,
+        units: Units,
         power_on: bool,
         adus: &'static mut [Adu],
     ) -> Self {
         let packet_ms = module.packet_ms();
-        let units = FastUnit {
-            unit: Some(unit),
-            is_fast: false,
-        };
         let sending = if power_on { 0 } else { packet_ms };
         Self {
             radio: Lora::new(serial, mode, aux, module, sending),

@@ -48,8 +48,10 @@ impl Address {
 /// unique identity, or `low` if that is not 0 (SERIAL_LOW, for two units with the same hash).
 #[must_use]
 pub fn serial_number(unique_id: [u16; 6], low: u16) -> u32 {
-    let bytes = unique_id.into_iter().flat_map(u16::to_le_bytes);
-    let hash = bytes.fold(crc::START, crc::step);
+    let hash = unique_id.iter().fold(crc::START, |hash, word| {
+        let [low, high] = word.to_le_bytes();
+        crc::step(crc::step(hash, low), high)
+    });
     0x0D00_0000 | u32::from(if low == 0 { hash } else { low })
 }
 

@@ -7,6 +7,7 @@
 
 use board_support::pac::Interrupt;
 use firmware::{
+    HAS_EVENTS,
     config::{LineName, Origin},
     start_up::RECOVERY_UNIT,
 };
@@ -143,7 +144,7 @@ impl Served {
         let (reply, contest, delay_ms) = device.lock(|device| {
             let delay_ms = device.config.response_delay_ms();
             device.set_origin(origin);
-            if request.unit() == fast::ADDRESS {
+            if HAS_EVENTS && request.unit() == fast::ADDRESS {
                 let (reply, contest) = self.server.serve_fast(request, unit, &mut **device);
                 return (reply, Some(contest), 0);
             }
@@ -151,10 +152,10 @@ impl Served {
         });
         let (outcome, writes) = (reply.outcome(), reply.writes());
         match (self.line, contest) {
-            (LineName::Rs485, Some(contest)) => {
+            (LineName::Rs485, Some(contest)) if HAS_EVENTS => {
                 rs485.lock(|line| line.as_mut().map(|line| line.arbitrate(reply, contest)));
             }
-            (LineName::Rs485, None) => {
+            (LineName::Rs485, _) => {
                 let delay_ms = if self.at_once { 0 } else { delay_ms };
                 rs485.lock(|line| line.as_mut().map(|line| line.send(reply, delay_ms)));
             }

@@ -8,15 +8,17 @@ use board_support::{
 };
 use cortex_m::peripheral::SCB;
 use firmware::{
+    HAS_EVENTS,
     config::{self, Config, LineConfig, RadioConfig},
     device::Identity,
     leds::{Leds, Trouble},
+    line,
     start_up::{self, Address, RECOVERY_UNIT},
     store::{Store, WriteError},
 };
 use modbus_server::{
     Adu, fast,
-    line::{FastUnit, Framing, Gaps, Port, Receiver, Width, Windows},
+    line::{Framing, Gaps, Port, Receiver, Width, Windows},
 };
 use modio_drivers::DacLink;
 use register_map::{
@@ -103,7 +105,7 @@ pub fn up(
     let mut sampler = board.sampler;
     let (modules, analog_outputs) = install(installed, &mut sampler, board.dacs);
     let serial_number = start_up::serial_number(board.unique_id, config.serial_low());
-    let is_rtu = settings.mode == Mode::Rtu;
+    let is_rtu = settings.mode == Mode::Rtu && HAS_EVENTS;
     let identity = Identity {
         serial_number,
         reports_events: is_rtu && matches!(address, Address::Unit(_)),
@@ -151,11 +153,7 @@ pub fn up(
     let t35 = settings
         .frame_gap
         .map_or(gaps.t35, |tenths| gaps.frame_gap(tenths));
-    let units = FastUnit {
-        unit: address.unit(),
-        is_fast: is_rtu,
-    };
-    let start_line = || {
+    let line = line::units(address.unit(), is_rtu).and_then(|units| {
         let strict = settings.gap_rule == GapRule::Drop;
         let (receiver, (t15_ns, t35_ns)) = match framing {
             Framing::Rtu => (Receiver::rtu(units, strict), (gaps.t15.min(t35), t35)),
@@ -186,22 +184,14 @@ pub fn up(
             Windows::new(bit, us),
             longest_ms,
         ))
-    };
-    let line = start_line();
+    });
 
     let (radio, radio_uart) = radio_config
         .and_then(|config| {
+            let units = line::units(address.unit(), false)?;
             let (uart, mode, aux) = board.radio.start(&mut board.rcc)?;
             let power_on = u16::from(board.reset_cause) & POWER_ON != 0;
-            let radio = Radio::new(
-                Serial,
-                mode,
-                aux,
-                config,
-                identity.unit,
-                power_on,
-                radio_adus,
-            );
+            let radio = Radio::new(Serial, mode, aux, config, units, power_on, radio_adus);
             Some((radio, uart))
         })
         .unzip();

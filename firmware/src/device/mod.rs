@@ -48,6 +48,7 @@ pub use points::Points;
 pub use port::IoPort;
 pub use state::{Identity, State};
 
+use crate::HAS_EVENTS;
 use crate::config::{Config, LineName, Origin, Point};
 use crate::update::{Order, TRIAL_S, Update};
 
@@ -211,7 +212,9 @@ impl<const SLOTS: usize> Device<SLOTS> {
             return;
         };
         let edges = port.scanned(channels, words, now);
-        self.events.look(slot, port, now);
+        if HAS_EVENTS {
+            self.events.look(slot, port, now);
+        }
         if edges == 0 {
             return;
         }
@@ -220,7 +223,9 @@ impl<const SLOTS: usize> Device<SLOTS> {
                 let point = first.wrapping_add(channel as u16);
                 let level = channels.bit(channel);
                 self.edges.add(point, level, now, settings.filter);
-                self.events.edge(slot, channel, level);
+                if HAS_EVENTS {
+                    self.events.edge(slot, channel, level);
+                }
             }
         }
     }
@@ -507,7 +512,8 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
 
     /// Function 70 with the unit's own address: which points report events.
     fn check_custom(&self, code: u8, data: &[u8]) -> Result<(), Exception> {
-        let is_served = code == fast::FUNCTION
+        let is_served = HAS_EVENTS
+            && code == fast::FUNCTION
             && self.state.reports_events()
             && self.config.origin_line() == LineName::Rs485;
         if !is_served {

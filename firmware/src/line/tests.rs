@@ -188,10 +188,7 @@ const WINDOWS: Windows = Windows {
 impl Bench {
     fn new() -> Self {
         let adus = Box::leak(Box::new([Adu::new(), Adu::new()]));
-        let units = FastUnit {
-            unit: Some(17),
-            is_fast: true,
-        };
+        let units = units(Some(17), true).expect("an address");
         let port = Port::new(Receiver::rtu(units, false), adus);
         let (uart, gap) = (FakeUart::default(), FakeGap::default());
         let mut bench = Self {

@@ -372,7 +372,7 @@ impl<'a, U: Units> Receiver<'a, U> {
         self.note(faults);
         self.check = crc::step(self.check, byte);
         self.keep_or_follow(byte);
-        if self.state & FOLLOWS != 0 {
+        if U::FAST && self.state & FOLLOWS != 0 {
             self.seek_reply();
         }
     }

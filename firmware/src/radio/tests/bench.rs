@@ -14,6 +14,7 @@ use modbus_server::{Counters, Outcome, Server, Tables, crc, line::Framing};
 use modio_drivers::LoraSettings;
 
 use super::super::*;
+use crate::line::units;
 
 pub(super) const SETTINGS: LoraSettings = match LoraSettings::new(0, 23, 2, 0) {
     Some(settings) => settings,
@@ -145,7 +146,7 @@ impl Bench {
             [pin(true), pin(true)],
             pin(false),
             CONFIG,
-            17,
+            units(Some(17), false).expect("an address"),
             true,
             adus,
         );

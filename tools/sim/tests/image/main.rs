@@ -41,7 +41,6 @@ mod cores;
 mod counters;
 mod dac_faults;
 mod dip;
-mod fast;
 mod faults;
 mod flash_faults;
 mod hung_task;

@@ -1,7 +1,7 @@
 //! The release image of the modio-08 on the virtual board. The image comes from `MODIO_ELF_08`, which `cargo xtask
 //! test` sets after building it.
 //!
-//! The tests of the four slots are in `slots`, `analog`, `digital` and `faults_of_slots`. The other files are those of
+//! The tests of the four slots are in `slots`, `analog`, `digital` and `faults_of_slots`, those of function 70 in `fast`. The other files are those of
 //! the modio-02's tests whose result depends on the board, with one module in the first slot: start, store, timing,
 //! stack, links, the pins of the radio, and an update.
 
@@ -21,6 +21,7 @@ const FILES: [&str; 4] = [
 
 mod analog;
 mod digital;
+mod fast;
 mod faults_of_slots;
 mod fitted;
 mod slots;
@@ -32,8 +33,6 @@ mod bench;
 mod boot;
 #[path = "../image/campaign.rs"]
 mod campaign;
-#[path = "../image/fast.rs"]
-mod fast;
 #[allow(dead_code, reason = "other tests of the modio-02 use the rest")]
 #[path = "../image/in_slots.rs"]
 mod in_slots;
