@@ -87,8 +87,10 @@ impl Persistence {
     #[inline(never)]
     fn save(&mut self, device: &mut impl Mutex<T = &'static mut Device>) -> Option<Event> {
         // A copy, so that requests do not wait while the settings are encoded. They stay the same until the end of
-        // the save.
-        let settings = device.lock(|device| *device.config.to_save());
+        // the save. In two parts, because requests wait for each.
+        let mut settings = Settings::defaults(BOARD);
+        device.lock(|device| settings.copy_values(device.config.to_save()));
+        device.lock(|device| settings.copy_links(device.config.to_save()));
         let mut saving = match self.saving.take() {
             Some(saving) => saving,
             None => {
