@@ -126,6 +126,9 @@ impl Scanning {
                     enqueue(events, event);
                 }
             }
+            if beat {
+                device.run_links();
+            }
         });
         if tripped {
             enqueue(events, Event::CommunicationLost);

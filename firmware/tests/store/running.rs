@@ -1,12 +1,15 @@
 //! The steps of a device's life that concern the store.
 
-use firmware::config::Settings;
-use firmware::store::{Loaded, Saving, Store, WriteError};
+use firmware::store::{Saving, Store, WriteError};
 use register_map::board::MODIO_02;
-use register_map::configuration::{COMMAND, KEY, RULES, module_of};
-use register_map::rule_at;
+use register_map::configuration::{COMMAND, KEY, RULES, SAFE, START, module_of};
+use register_map::{Module, links, rule_at};
 
 use crate::flash::{Fault, MockFlash, Noise};
+
+/// The settings of a modio-02, and what a start finds.
+pub type Settings = firmware::config::Settings<1>;
+pub type Loaded = firmware::store::Loaded<1>;
 
 /// MODULE of the board's port.
 const MODULE_SLOT: u16 = module_of(5);
@@ -71,16 +74,23 @@ pub fn random_settings(seed: u64, changed: usize) -> Settings {
     Settings::load(&MODIO_02, pairs.into_iter()).0
 }
 
-/// Returns settings in which every value that can be changed differs from its default.
+/// Returns settings in which every value that can be changed differs from its default: those of 4DO, which has the most
+/// links. Their sources do not count, because the unit has no input.
 pub fn fullest_settings(seed: u64) -> Settings {
     let mut noise = Noise(seed);
-    let mut pairs = vec![(MODULE_SLOT, 5)];
+    let mut pairs = vec![(MODULE_SLOT, Module::Do4.code())];
     for rule in RULES
         .iter()
         .filter(|rule| ![KEY, COMMAND].contains(&rule.first))
     {
         for address in rule.addresses().filter(|address| *address != MODULE_SLOT) {
             pairs.extend(some_value(address, &mut noise).map(|value| (address, value)));
+        }
+    }
+    for point in MODIO_02.points() {
+        pairs.extend([SAFE, START].map(|first| (first + point, 1)));
+        for link in [false, true].map(|second| links::of_point(point, second)) {
+            pairs.extend((link + 1..link + links::WORDS).map(|address| (address, 3)));
         }
     }
     Settings::load(&MODIO_02, pairs.into_iter()).0

@@ -5,8 +5,8 @@ use register_map::state::MAP_VERSION_VALUE;
 use register_map::{Access, BLOCKS, Board, InForce, Module, Rule, Text};
 
 use crate::{
-    Description, ModuleType, Narrower, PointKind, Port, Reading, Register, Scope, Table, Unit,
-    Value, Values,
+    Description, Field, ModuleType, Narrower, PointKind, Port, Reading, Register, Scope, Table,
+    Unit, Value, Values,
 };
 
 /// The kinds of point in the order of [`Description::kinds`].
@@ -75,6 +75,20 @@ fn value(value: register_map::Value) -> Value {
         register_map::Value::Codes(names) => Value::Codes(owned(names)),
         register_map::Value::Bits(names) => Value::Bits(owned(names)),
         register_map::Value::Opaque => Value::Opaque,
+        register_map::Value::Point => Value::Point,
+        register_map::Value::Fields(kind, fields) => Value::Fields {
+            kind: place(kind),
+            fields: fields.iter().map(field).collect(),
+        },
+    }
+}
+
+fn field(field: &register_map::Field) -> Field {
+    Field {
+        name: field.name.to_owned(),
+        value: value(field.value),
+        values: values(field.values),
+        default: field.default,
     }
 }
 
@@ -152,6 +166,7 @@ mod tests {
         assert_eq!(of("MODULE").scope, Scope::Port);
         assert_eq!(of("FILTER").scope, Scope::Point);
         assert_eq!(of("pulses").scope, Scope::Point);
+        assert_eq!(of("link").scope, Scope::Point);
         assert_eq!(of("product code").scope, Scope::Unit);
         assert_eq!(of("unique device identity").scope, Scope::Unit);
         assert_eq!(of("FILTER").narrower.as_ref().unwrap().kind, 3);

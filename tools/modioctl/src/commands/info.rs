@@ -6,7 +6,7 @@ use modbus_line::names;
 use register_map::configuration::{BAUD, FRAME_GAP};
 use register_map::state::update;
 use register_map::update::State;
-use register_map::{fault, radio, state};
+use register_map::{edges, fault, links, radio, state};
 use serde_json::{Map, Value as Json, json};
 
 use crate::bus::{Lost, decode};
@@ -36,8 +36,10 @@ const GROUPS: [&str; 7] = [
 const fn group(address: u16) -> &'static str {
     match address {
         BAUD..=FRAME_GAP | state::UNIT_ADDRESS => "line",
-        state::RESET_CAUSE..=state::STACK_FREE | state::UPDATE => "state",
-        state::MODULE_IN_FORCE..state::UNIQUE_ID | state::CHANNEL_STATUS..fault::KIND => "modules",
+        state::RESET_CAUSE..=state::STACK_FREE | state::UPTIME_MS | state::UPDATE => "state",
+        state::MODULE_IN_FORCE..state::UNIQUE_ID
+        | state::CHANNEL_STATUS..fault::KIND
+        | edges::LAST_EDGE..links::LINKS => "modules",
         state::BUS_MESSAGES..state::CHANNEL_STATUS | radio::BUS_MESSAGES..=radio::T15_GAPS => {
             "counters"
         }
@@ -218,7 +220,9 @@ mod tests {
             ("BAUD", "line"),
             ("p1.module_in_force", "modules"),
             ("p1.1.channel_status", "modules"),
+            ("p1.1.last_edge", "modules"),
             ("uptime", "state"),
+            ("uptime_ms", "state"),
             ("update", "state"),
             ("fault_kind", "faults"),
             ("line_repairs", "faults"),

@@ -3,7 +3,7 @@
 //!
 //! The tests of the four slots are in `slots`, `analog`, `digital` and `faults_of_slots`, those of function 70 in `fast`. The other files are those of
 //! the modio-02's tests whose result depends on the board, with one module in the first slot: start, store, timing,
-//! stack, the pins of the radio, and an update.
+//! stack, links, the pins of the radio, and an update.
 
 use sim::board::{Layout, MODIO_08};
 
@@ -36,6 +36,8 @@ mod campaign;
 #[allow(dead_code, reason = "other tests of the modio-02 use the rest")]
 #[path = "../image/in_slots.rs"]
 mod in_slots;
+#[path = "../image/links.rs"]
+mod links;
 #[path = "../image/power_cut.rs"]
 mod power_cut;
 #[allow(dead_code, reason = "the tests over the air use the rest")]
@@ -46,6 +48,9 @@ mod radio;
 mod registers;
 #[path = "../image/saving.rs"]
 mod saving;
+#[allow(dead_code, reason = "other tests of the modio-02 use the rest")]
+#[path = "../image/self_description.rs"]
+mod self_description;
 #[path = "../image/stack.rs"]
 mod stack;
 #[path = "../image/timing.rs"]

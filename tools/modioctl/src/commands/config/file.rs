@@ -42,6 +42,7 @@ fn comment(item: &Item, unit: &str) -> String {
     let takes = match (&item.meaning, &item.values) {
         (Meaning::Value(Value::Number(of)), Some(values)) => takes(values, of),
         (Meaning::Value(Value::Codes(_)), _) => String::new(),
+        (Meaning::Value(Value::Fields { .. }), _) => crate::listing::values(item),
         (_, Some(values)) if unit.is_empty() => takes(values, &Unit::default()),
         _ => String::new(),
     };
@@ -240,6 +241,18 @@ mod tests {
         let text = "BAUD = 19_200 # rate\np5.module = '4ao'\n5.1.safe = 0xFFFF\np5.2.range = \"4-20 mA\"\n";
         let settings = ["BAUD=192", "p5.module=5", "p5.1.safe=65535", "p5.2.range=1"];
         assert_eq!(checked(text).unwrap(), settings);
+    }
+
+    #[test]
+    fn links_are_those_of_the_modules_in_the_file() {
+        let text = "p5.module = '2relay'\np5.3.link1 = 'p5.1, toggle'\np5.4.link2 = 'none'\n";
+        let settings = ["p5.module=3", "p5.3.link1=16", "p5.4.link2=65535"];
+        assert_eq!(checked(text).unwrap(), settings);
+        let wrong = checked("p5.module = '4di'\np5.3.link1 = 'none'").unwrap_err();
+        assert!(
+            wrong.contains("line 2: p5.3.link1: no such point"),
+            "{wrong}"
+        );
     }
 
     #[test]
