@@ -15,6 +15,8 @@ fn main() {
     }
     println!("cargo::rustc-link-arg-bins=--nmagic");
     println!("cargo::rustc-link-arg-bins=-Tlink.x");
+    // Functions with the same code are linked once. Nothing compares their addresses.
+    println!("cargo::rustc-link-arg-bins=--icf=all");
     println!("cargo::rerun-if-env-changed=MODIO_MAP");
     if let Some(map) = env::var_os("MODIO_MAP") {
         println!("cargo::rustc-link-arg-bins=-Map={}", map.display());

@@ -70,6 +70,8 @@ pub struct Leds<P> {
     /// Time when the LEDs were last set, in milliseconds since the start.
     set_at: u32,
     tick: u16,
+    /// A request has been served since the last tick.
+    requested: bool,
     activity: u8,
     /// Ticks for which all LEDs still blink.
     identify: u16,
@@ -84,6 +86,7 @@ impl<P> Leds<P> {
             standing,
             set_at: 0,
             tick: 0,
+            requested: false,
             activity: 0,
             identify: 0,
         }
@@ -120,14 +123,15 @@ impl<P> Leds<P> {
 }
 
 impl<P: OutputPin> Leds<P> {
-    /// Sets the LEDs, if their next step is due. `request` is only called then and returns whether a request has
-    /// been served since the last call.
-    pub fn show(&mut self, millis: u32, module_fails: bool, request: impl FnOnce() -> bool) {
+    /// Sets the LEDs, if their next step is due. `request` says that a request has been served since the last call.
+    pub fn show(&mut self, millis: u32, module_fails: bool, request: bool) {
+        self.requested |= request;
         if millis.wrapping_sub(self.set_at) < u32::from(TICK_MS) {
             return;
         }
         self.set_at = millis;
-        let [activity, fault, run] = self.tick(request(), module_fails);
+        let request = core::mem::take(&mut self.requested);
+        let [activity, fault, run] = self.tick(request, module_fails);
         for (pin, high) in self.pins.iter_mut().zip([activity, fault, !run]) {
             let _ = pin.set_state(PinState::from(high));
         }

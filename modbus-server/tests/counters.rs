@@ -96,9 +96,9 @@ fn receiver() -> Receiver<'static> {
 }
 
 fn receive(receiver: &mut Receiver<'_>, bytes: &[u8]) {
-    bytes
-        .iter()
-        .for_each(|byte| receiver.character(*byte, Faults::NONE));
+    bytes.iter().for_each(|byte| {
+        receiver.character(*byte, Faults::NONE);
+    });
 }
 
 fn buffer() -> &'static mut Adu {

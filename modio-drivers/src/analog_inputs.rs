@@ -97,6 +97,8 @@ impl Input {
         }
     }
 
+    // Not inlined into the loop over the channels, which has few registers left.
+    #[inline(never)]
     fn show(&mut self, channels: &mut Channels, channel: usize) {
         if let Some(code) = self.filter.code() {
             let measured = Measured::of(code, &self.settings);

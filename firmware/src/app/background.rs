@@ -42,13 +42,14 @@ impl Background {
         self.persistence.erase();
 
         let free = self.stack.check();
-        let (identify, failing, millis, radio, saves) = device.lock(|device| {
+        let (identify, request, failing, millis, radio, saves) = device.lock(|device| {
             let identify = core::mem::take(&mut device.identify);
+            let request = core::mem::take(&mut device.activity);
             let state = &mut device.state;
             state.stack_free = free;
             let (millis, radio) = (state.millis(), state.radio_works);
             let saves = device.config.saves_left();
-            (identify, device.any_fails(), millis, radio, saves)
+            (identify, request, device.any_fails(), millis, radio, saves)
         });
         kept::keep_saves(saves);
         self.updating.work(self.persistence.flash(), device);
@@ -60,9 +61,7 @@ impl Background {
         if identify {
             self.leds.identify();
         }
-        self.leds.show(millis, failing, || {
-            device.lock(|device| core::mem::take(&mut device.activity))
-        });
+        self.leds.show(millis, failing, request);
         while let Some(event) = logged.dequeue() {
             self.log.event(event);
         }

@@ -35,6 +35,8 @@ pub struct Updating {
 }
 
 impl Updating {
+    // Not inlined into init, as `Store::prepare`.
+    #[inline(never)]
     pub fn new(flash: &mut Flash, crc: CrcUnit) -> Self {
         Self {
             journal: Journal::open(&BootPages(flash)),

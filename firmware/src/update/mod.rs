@@ -356,6 +356,8 @@ impl Update {
     }
 
     /// Returns the next step of the background task. Pass its end to [`Self::end`].
+    // Not inlined, so that its frame does not add to that of the step.
+    #[inline(never)]
     #[must_use]
     pub fn next(&self) -> Option<Job> {
         let running = &self.running;

@@ -85,8 +85,8 @@ impl Job {
 /// Programs the half-words of a block that differ. Returns false when one does not fit what lies there.
 fn program<S: Slot>(slot: &mut S, block: &Block) -> Result<bool, S::Error> {
     let first = usize::from(block.number) * BLOCK_BYTES;
-    let halves = block.bytes.as_chunks().0.iter();
-    for (offset, bytes) in (first..).step_by(2).zip(halves) {
+    for (n, bytes) in block.bytes.as_chunks().0.iter().enumerate() {
+        let offset = first + 2 * n;
         let half = u16::from_le_bytes(*bytes);
         let there = read(slot, offset);
         // Over a programmed half-word only 0 can be programmed (PM0075 2.3.3).

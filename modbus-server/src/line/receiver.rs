@@ -4,7 +4,7 @@ use super::ascii::{self, Part, Reader, Width};
 use super::messages::{Message, begins_reply};
 use super::state::{
     ASCII, ASCII_ENDED, ASCII_IDLE, DEAF, FOLLOWS, IDLE, NOT_ENDED, OVERRUN, PAUSED, QUIET, RTU,
-    SPOILED, TORN, UNKEPT,
+    SEEKS, SPOILED, TORN, UNKEPT,
 };
 use super::{Faults, Framing, Units, length};
 use crate::counters::count;
@@ -169,7 +169,7 @@ impl<'a, U: Units> Receiver<'a, U> {
     /// valid CRC and the length that its sub-function requires. It ends without a silence: [`close`](Self::close) it.
     pub fn is_fast_message(&self) -> bool {
         self.check == crc::GOOD
-            && self.state & !(FOLLOWS | QUIET) == 0
+            && self.state & !(FOLLOWS | QUIET | SEEKS) == 0
             && (self.filling.as_ref()).is_some_and(|adu| Message::of(adu).is_some())
     }
 
@@ -267,7 +267,7 @@ impl<'a, U: Units> Receiver<'a, U> {
         if begins_reply(adu.get(at), adu.get(at + 1), adu.get(at + 2)) {
             adu.clear();
             self.check = crc::START;
-            self.state = FOLLOWS;
+            self.state &= FOLLOWS | SEEKS;
             // No byte is overwritten before it is read.
             for n in 0..3 {
                 let byte = adu.get(at + n);
@@ -365,6 +365,9 @@ impl<'a, U: Units> Receiver<'a, U> {
         if self.state & PAUSED != 0 {
             count(&mut self.counters.gaps);
             self.state &= !PAUSED;
+            if self.units.is_fast() {
+                self.state |= SEEKS;
+            }
             if self.strict_t15 {
                 self.state |= TORN;
             }
@@ -372,7 +375,7 @@ impl<'a, U: Units> Receiver<'a, U> {
         self.note(faults);
         self.check = crc::step(self.check, byte);
         self.keep_or_follow(byte);
-        if U::FAST && self.state & FOLLOWS != 0 {
+        if U::FAST && self.state & (FOLLOWS | SEEKS) != 0 {
             self.seek_reply();
         }
     }

@@ -26,6 +26,9 @@ pub(super) const UNKEPT: u16 = 1 << 11;
 pub(super) const FOLLOWS: u16 = 1 << 12;
 /// In RTU mode, after that reply until the next t3.5: no error is counted.
 pub(super) const QUIET: u16 = 1 << 13;
+/// In RTU mode, after a gap longer than t1.5 in a frame: if that is the rest of a damaged request of Fast Modbus, its
+/// reply may follow without t3.5 of silence in between.
+pub(super) const SEEKS: u16 = 1 << 14;
 
 // Shortest and longest frame in bytes, and the number of bytes of the checksum.
 

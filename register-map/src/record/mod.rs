@@ -167,10 +167,12 @@ pub fn records(page: &[u8]) -> impl Iterator<Item = (usize, Record<'_>)> {
 /// contains only its mark and the [`BEGINNING`], complete or interrupted.
 #[must_use]
 pub fn is_vacant(page: &[u8]) -> bool {
-    let beginning = BEGINNING.iter().chain(core::iter::repeat(&0xFF));
-    // A power cut leaves ones instead of zeros, never the reverse.
-    let mut bytes = page.iter().skip(FIRST_OFFSET).zip(beginning);
-    bytes.all(|(byte, full)| byte & full == *full)
+    let content = page.get(FIRST_OFFSET..).unwrap_or_default();
+    content.iter().enumerate().all(|(n, byte)| {
+        let full = BEGINNING.get(n).unwrap_or(&0xFF);
+        // A power cut leaves ones instead of zeros, never the reverse.
+        byte & full == *full
+    })
 }
 
 #[cfg(test)]
