@@ -200,7 +200,9 @@ impl<const SLOTS: usize> Device<SLOTS> {
 
     /// Stores the inputs that a scan of a slot has read. `words` is false when the settings have changed since the scan
     /// began: then the words of the scan have the wrong unit. `late`: the scan before this one was some milliseconds ago,
-    /// because flash was erased. Call [`Self::run_links`] after the last slot.
+    /// because flash was erased. Call [`Self::run_links`] for all slots after the last.
+    // Not inlined into the scan, whose frame is large.
+    #[inline(never)]
     pub fn scanned(&mut self, slot: usize, channels: &Channels, words: bool, late: bool) {
         // 0 stands for an input without an edge.
         let now = self.state.millis().max(1);
@@ -340,6 +342,8 @@ impl<const SLOTS: usize> Device<SLOTS> {
     }
 
     /// Returns a register of [`Block::ReadOnly`] or of the pulse counters.
+    // Not inlined into the loop over the registers, which has few registers of the core left.
+    #[inline(never)]
     fn read_only_word(&self, address: u16) -> u16 {
         match address {
             counters::PULSES.. => self.points.input_word(address),

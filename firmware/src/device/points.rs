@@ -207,6 +207,8 @@ impl<const SLOTS: usize> Points<SLOTS> {
 
     /// Returns a register of the pulse counters or of the last edges: 0 for a point that does not exist or is not a
     /// digital input.
+    // Not inlined, as `Device::state_word`.
+    #[inline(never)]
     #[must_use]
     pub fn input_word(&self, address: u16) -> u16 {
         // Both blocks begin at a multiple of their length.

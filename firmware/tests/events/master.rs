@@ -63,13 +63,15 @@ impl Master {
         ];
         let expected = frame(&[address, 0x46, 0x18, 2, 0, 0b1111]);
         // The unit may be starting, and frames are damaged.
+        let mut reply = Vec::new();
         for _ in 0..50 {
-            if self.bus.ask(&frame(&request), None) == expected {
+            reply = self.bus.ask(&frame(&request), None);
+            if reply == expected {
                 self.known[n].states = 0b1111;
                 return;
             }
         }
-        panic!("unit {address} does not answer");
+        panic!("unit {address} answers {reply:02X?}");
     }
 
     /// Fetches events once. Adds their latencies in us. Returns whether there were any.

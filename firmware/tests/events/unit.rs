@@ -140,7 +140,8 @@ impl Unit {
 
     /// Passes the silence up to `at`.
     pub fn pass_silence(&mut self, at: f64, times: Times) {
-        let silence = at - self.silent_since;
+        // Sums of times are not exact.
+        let silence = at - self.silent_since + 1e-3;
         if silence >= times.t15 {
             self.port.short_silence(0);
         }
