@@ -5,6 +5,7 @@
 
 use board_support::{Flash, flash::FlashError, kept};
 use firmware::{
+    config::PARTS,
     device::Restart,
     store::{Operation, Saving, Store, WriteError},
 };
@@ -87,10 +88,11 @@ impl Persistence {
     #[inline(never)]
     fn save(&mut self, device: &mut impl Mutex<T = &'static mut Device>) -> Option<Event> {
         // A copy, so that requests do not wait while the settings are encoded. They stay the same until the end of
-        // the save. In two parts, because requests wait for each.
+        // the save.
         let mut settings = Settings::defaults(BOARD);
-        device.lock(|device| settings.copy_values(device.config.to_save()));
-        device.lock(|device| settings.copy_links(device.config.to_save()));
+        for part in 0..PARTS {
+            device.lock(|device| settings.copy_part(part, device.config.to_save()));
+        }
         let mut saving = match self.saving.take() {
             Some(saving) => saving,
             None => {

@@ -126,10 +126,11 @@ impl Scanning {
                     enqueue(events, event);
                 }
             }
-            if beat {
-                device.run_links();
-            }
         });
+        if beat {
+            // Under a lock for each slot, because requests wait for it.
+            (0..SLOTS).for_each(|slot| device.lock(|device| device.run_links(slot)));
+        }
         if tripped {
             enqueue(events, Event::CommunicationLost);
         }

@@ -44,7 +44,7 @@ use lock::Lock;
 pub use origin::{LineName, Origin};
 use saves::Saves;
 pub use settings::RestartValues;
-pub use settings::Settings;
+pub use settings::{PARTS, Settings};
 use settings::{RESTARTS, format_suits_mode, takes_module};
 
 /// How far a save is.

@@ -10,6 +10,9 @@ use super::links::Links;
 /// High byte of every configuration address. The low byte is the index in [`Settings`].
 const PAGE: u16 = KEY >> 8;
 
+/// Number of parts in which settings are copied, so that requests wait for a short time only.
+pub const PARTS: usize = 3;
+
 /// Number of settings that need a restart.
 pub(super) const RESTARTS: usize = restarts();
 
@@ -77,14 +80,14 @@ impl<const SLOTS: usize> Settings<SLOTS> {
         (settings, rejected)
     }
 
-    /// Copies all settings but the links.
-    pub const fn copy_values(&mut self, from: &Self) {
-        self.values = from.values;
-    }
-
-    /// Copies the links.
-    pub const fn copy_links(&mut self, from: &Self) {
-        self.links = from.links;
+    /// Copies one of the [`PARTS`] of other settings.
+    pub fn copy_part(&mut self, part: usize, from: &Self) {
+        let half = self.values.len() / 2;
+        let own = self.values.chunks_exact_mut(half);
+        match own.zip(from.values.chunks_exact(half)).nth(part) {
+            Some((own, from)) => own.copy_from_slice(from),
+            None => self.links = from.links,
+        }
     }
 
     /// Returns the value of a setting, or 0 for an address without one.

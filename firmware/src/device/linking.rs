@@ -6,43 +6,50 @@ use super::Device;
 use crate::links::{Link, OF_A_SLOT};
 
 impl<const SLOTS: usize> Device<SLOTS> {
-    /// Runs the links with the inputs of a scan of all slots. The levels at the first scan are no edges.
-    pub fn run_links(&mut self) {
-        let act = core::mem::replace(&mut self.linked, true);
-        self.update_links(act);
+    /// Runs the links to the outputs of a slot with the inputs of a scan of all slots. The levels at the first scan are no
+    /// edges.
+    pub fn run_links(&mut self, slot: usize) {
+        if self.has_links {
+            let act = self.linked >> (slot & 7) & 1 != 0;
+            self.update_links(slot, act);
+        }
+        self.linked |= 1 << (slot & 7);
     }
 
-    /// Stores the levels of all sources. `act`: a level that has changed is an edge. Otherwise it is that of a link whose
-    /// registers have changed.
+    /// Stores the levels of the sources after the settings have changed. They are no edges.
+    pub(super) fn settle_links(&mut self) {
+        self.has_links = false;
+        (0..SLOTS).for_each(|slot| self.update_links(slot, false));
+    }
+
+    /// Stores the levels of the sources of the links to a slot. `act`: a level that has changed is an edge.
     #[inline(never)]
-    pub(super) fn update_links(&mut self, act: bool) {
+    fn update_links(&mut self, slot: usize, act: bool) {
         let alone = self.comm_watchdog.has_expired();
         let now = self.state.millis();
-        for slot in 0..SLOTS {
-            for index in 0..OF_A_SLOT {
-                let link = self.config.link(slot, index);
-                let Some(levels) = self.levels.get(slot).copied() else {
-                    return;
-                };
-                let before = levels >> index & 1 != 0;
-                let level = self.level_of(link, before);
-                if level == before {
-                    continue;
-                }
-                if let Some(levels) = self.levels.get_mut(slot) {
-                    *levels ^= 1 << index;
-                }
-                let (output, other) = (index % CHANNELS, (index + CHANNELS) % OF_A_SLOT);
-                let second = self.config.link(slot, other);
-                let wanted = second.is_awake(alone) && second.wants(levels >> other & 1 != 0);
-                if act
-                    && link.is_awake(alone)
-                    && let Some(port) = self.points.ports_mut().get_mut(slot)
-                    && let Some(act) = link.at_edge(level, port.channels.bit(output), wanted)
-                {
-                    port.act(output, act, now);
-                }
+        let mut levels = self.levels.get(slot).copied().unwrap_or_default();
+        for index in 0..OF_A_SLOT {
+            let link = self.config.link(slot, index);
+            self.has_links |= link.source().is_some();
+            let before = levels >> index & 1 != 0;
+            let level = self.level_of(link, before);
+            if level == before {
+                continue;
             }
+            levels ^= 1 << index;
+            let (output, other) = (index % CHANNELS, index ^ CHANNELS);
+            let second = self.config.link(slot, other);
+            let wanted = second.is_awake(alone) && second.wants(levels >> other & 1 != 0);
+            if act
+                && link.is_awake(alone)
+                && let Some(port) = self.points.ports_mut().get_mut(slot)
+                && let Some(act) = link.at_edge(level, port.channels.bit(output), wanted)
+            {
+                port.act(output, act, now);
+            }
+        }
+        if let Some(own) = self.levels.get_mut(slot) {
+            *own = levels;
         }
     }
 

@@ -66,8 +66,10 @@ pub struct Device<const SLOTS: usize> {
     edges: EdgeLog,
     /// The levels of the sources of the links of each slot, one bit for each link.
     levels: [u8; SLOTS],
-    /// The levels are those of a scan. From then on a change is an edge.
-    linked: bool,
+    /// There is a link with a source.
+    has_links: bool,
+    /// Slots whose levels are those of a scan, one bit for each. From then on a change is an edge.
+    linked: u8,
     events: Events<SLOTS>,
     /// A command from a request, to be executed when its reply has been sent.
     ordered: Option<Command>,
@@ -146,7 +148,8 @@ impl<const SLOTS: usize> Device<SLOTS> {
             comm_watchdog: CommWatchdog::new(),
             edges: EdgeLog::new(),
             levels: [0; SLOTS],
-            linked: false,
+            has_links: false,
+            linked: 0,
             events: Events::new(),
             ordered: None,
             restart: None,
@@ -167,7 +170,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
         self.config.compare();
         self.revision = self.config.revision();
         self.for_each_point(IoPort::configure);
-        self.update_links(false);
+        self.settle_links();
     }
 
     /// Passes the settings in force of every point to `act`, with the point's port and channel.

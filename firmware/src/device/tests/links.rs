@@ -344,7 +344,7 @@ fn levels_at_the_start_and_of_a_new_link_are_no_edges() {
         channels.set_word(0, 4000);
         bench.device.scanned(port, &channels, true, false);
     }
-    bench.device.run_links();
+    (0..4).for_each(|slot| bench.device.run_links(slot));
     let bits = |bench: &mut Bench<4>| bench.ask(&[1, 0, OUTPUT as u8, 0, 4])[2];
     assert_eq!(bits(&mut bench), 0);
     bench.unlock();

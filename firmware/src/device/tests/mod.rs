@@ -124,6 +124,6 @@ impl<const SLOTS: usize> Bench<SLOTS> {
         let mut channels = *self.device.points.ports()[index].channels();
         set(&mut channels);
         self.device.scanned(index, &channels, true, false);
-        self.device.run_links();
+        (0..SLOTS).for_each(|slot| self.device.run_links(slot));
     }
 }
