@@ -59,6 +59,8 @@ where
 {
     /// Creates the line of a unit, 1 to 247. M0 and M1 are high, AUX is pulled up. After a `power_on` the module has
     /// just been started too; after another reset it may be sending a reply.
+    // Not inlined into init, whose frame is too large for short instructions.
+    #[inline(never)]
     pub fn new(
         serial: S,
         mode: [M; 2],

@@ -37,6 +37,7 @@ pub mod layout;
 pub mod limits;
 pub mod links;
 mod module;
+pub mod name;
 pub mod part;
 pub mod points;
 mod port;
@@ -59,8 +60,9 @@ pub use value::{Field, Unit, Value};
 pub use values::Values;
 
 /// Every block, in ascending order of the addresses.
-pub static BLOCKS: [&Block; 8] = [
+pub static BLOCKS: [&Block; 9] = [
     &points::BLOCK,
+    &name::BLOCK,
     &configuration::BLOCK,
     &state::BLOCK,
     &fault::BLOCK,

@@ -37,7 +37,7 @@ use modbus_server::{
 use modio_drivers::{CHANNELS, Channels};
 use register_map::configuration::COMMAND;
 use register_map::update::status;
-use register_map::{codes::Command, counters, edges, fault, radio, state as state_map};
+use register_map::{codes::Command, counters, edges, fault, name, radio, state as state_map};
 
 pub use comm_watchdog::CommWatchdog;
 use description::Description;
@@ -101,18 +101,24 @@ enum Block {
     Points,
     Config,
     Pulses,
-    /// State, fault record, counters of the radio, last edges.
+    /// Name of the board, state, fault record, counters of the radio, last edges.
     ReadOnly,
 }
 
 /// The registers of [`Block::ReadOnly`]. A span lies within one of these ranges.
-const READ_ONLY: [&[Range<u16>]; 4] = [state_map::SPANS, fault::SPANS, radio::SPANS, edges::SPANS];
+const READ_ONLY: [&[Range<u16>]; 5] = [
+    name::SPANS,
+    state_map::SPANS,
+    fault::SPANS,
+    radio::SPANS,
+    edges::SPANS,
+];
 
 impl Block {
     #[inline(always)]
     const fn of(span: Span) -> Self {
         // Most requests are for points.
-        if span.start() < 0x0100 {
+        if span.start() < register_map::points::COUNT {
             Self::Points
         } else {
             Self::of_others(span)
@@ -123,7 +129,7 @@ impl Block {
     const fn of_others(span: Span) -> Self {
         match span.start().to_be_bytes() {
             [1 | 4, _] => Self::Config,
-            [2, _] | [3, 0x80..=0xFF] => Self::ReadOnly,
+            [0 | 2, _] | [3, 0x80..=0xFF] => Self::ReadOnly,
             [3, _] => Self::Pulses,
             _ => Self::Points,
         }
@@ -328,6 +334,13 @@ impl<const SLOTS: usize> Device<SLOTS> {
         }
     }
 
+    /// Returns a register of the board's name.
+    fn name_word(&self, address: u16) -> u16 {
+        let index = usize::from(address.wrapping_sub(name::NAME));
+        let byte = self.config.board().name.as_bytes().get(index);
+        byte.copied().unwrap_or_default().into()
+    }
+
     /// Returns the status register (0x020A).
     fn status(&self) -> u16 {
         use state_map::status;
@@ -349,6 +362,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
     #[inline(never)]
     fn read_only_word(&self, address: u16) -> u16 {
         match address {
+            ..state_map::PRODUCT_CODE => self.name_word(address),
             counters::PULSES.. => self.points.input_word(address),
             fault::KIND..radio::BUS_MESSAGES => self.state.fault_word(address),
             state_map::STATUS => self.status(),

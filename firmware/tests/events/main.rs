@@ -2,15 +2,17 @@
 //!
 //! The units are the device with its server and port, as on the board; the bus is a model: characters take their time,
 //! crystals differ, interrupts are late, and receivers get bits wrong. `MODIO_EVENTS_S` is the time that passes on the
-//! bus, in seconds, and `MODIO_EVENTS_OUT` a folder for the latencies.
+//! bus, in seconds, and `MODIO_EVENTS_OUT` a folder for the picture of the latencies, `events.svg`.
 
 mod bus;
 mod master;
+mod plot;
 mod unit;
 
 use std::env;
 
 use master::{Master, Traffic, polling};
+use plot::Panel;
 
 /// Returns the seconds that a test simulates: a minute, unless the environment says otherwise.
 fn seconds() -> f64 {
@@ -25,6 +27,7 @@ fn quantile(sorted: &[f64], share: f64) -> f64 {
 
 #[test]
 fn each_edge_is_reported_once_in_order_and_much_earlier_than_by_polling() {
+    let mut panels = Vec::new();
     for (baud, per_s, median_share, most_share) in
         [(115_200, 50.0, 10.0, 5.0), (9_600, 5.0, 6.0, 4.0)]
     {
@@ -38,12 +41,6 @@ fn each_edge_is_reported_once_in_order_and_much_earlier_than_by_polling() {
         latencies.sort_by(f64::total_cmp);
         let mut polled = polling(baud, 30, latencies.len());
         polled.sort_by(f64::total_cmp);
-        if let Ok(folder) = env::var("MODIO_EVENTS_OUT") {
-            for (name, values) in [("events", &latencies), ("polling", &polled)] {
-                let text: String = values.iter().map(|us| format!("{us:.0}\n")).collect();
-                std::fs::write(format!("{folder}/{name}-{baud}.txt"), text).unwrap();
-            }
-        }
         for (share, least) in [(0.5, median_share), (0.99, most_share)] {
             let (events, polls) = (quantile(&latencies, share), quantile(&polled, share));
             println!(
@@ -55,6 +52,14 @@ fn each_edge_is_reported_once_in_order_and_much_earlier_than_by_polling() {
                 "{baud}: {share}: {events:.0} of {polls:.0} us"
             );
         }
+        panels.push(Panel {
+            baud,
+            events: latencies,
+            polling: polled,
+        });
+    }
+    if let Ok(folder) = env::var("MODIO_EVENTS_OUT") {
+        std::fs::write(format!("{folder}/events.svg"), plot::svg(&panels)).unwrap();
     }
 }
 

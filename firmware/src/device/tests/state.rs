@@ -24,6 +24,11 @@ fn identity_and_state_are_read_and_never_written() {
     record[13] = 9;
     assert_eq!(bench.read(0x0260, 16), Ok(record));
     assert_eq!(bench.read(0x0270, 9), Ok(std::vec![0; 9]));
+    let name = bench.read(0x00C8, 20).unwrap();
+    let name: Vec<u8> = name.into_iter().map(|word| word as u8).collect();
+    assert_eq!(name, *b"modio-02\0\0\0\0\0\0\0\0\0\0\0\0");
+    assert_eq!(bench.read(0x00C7, 1), Err(2));
+    assert_eq!(bench.write(0x00C8, &[1]), Err(2));
     assert_eq!(bench.read(0x0228, 2), Ok(std::vec![0x0D00, 0x1234]));
     for gap in [0x022B, 0x0239, 0x0279, 0x02FF, 0x0340, 0x03C0] {
         assert_eq!(bench.read(gap, 1), Err(2), "{gap:#x}");

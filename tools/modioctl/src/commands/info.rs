@@ -6,7 +6,7 @@ use modbus_line::names;
 use register_map::configuration::{BAUD, FRAME_GAP};
 use register_map::state::update;
 use register_map::update::State;
-use register_map::{edges, fault, links, radio, state};
+use register_map::{edges, fault, links, name, radio, state};
 use serde_json::{Map, Value as Json, json};
 
 use crate::bus::{Lost, decode};
@@ -44,7 +44,8 @@ const fn group(address: u16) -> &'static str {
             "counters"
         }
         fault::KIND..=fault::RESERVED => "faults",
-        state::PRODUCT_CODE..=state::BOARD
+        name::NAME..=0x00DB
+        | state::PRODUCT_CODE..=state::BOARD
         | state::COMMIT..=state::DESCRIPTION_CRC
         | state::UNIQUE_ID..state::BUS_MESSAGES => "identity",
         // Firmware that is newer than this program has them.

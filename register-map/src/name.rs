@@ -1,0 +1,13 @@
+//! The name of the board for clients of function 70, 0x00C8 to 0x00DB: wb-modbus-ext-scanner reads it of each unit that
+//! it finds, and waits for ever when it gets an exception.
+
+use crate::block::block;
+use crate::rule::Rule;
+use crate::value::Value;
+
+block! {
+    "Name of the board", 0x00C8..=0x00DB;
+
+    /// A character in each low byte
+    NAME "board name": 0x00C8 x 20, Value::Opaque, Rule::read_only();
+}
