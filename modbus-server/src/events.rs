@@ -107,8 +107,8 @@ impl EventLog {
 
     /// Appends the events to a reply, newest first.
     pub(crate) fn append_to(&self, adu: &mut Adu) {
-        for back in 1..=self.count() {
-            let at = self.added.wrapping_sub(back) % Self::CAPACITY as u8;
+        for newer in 0..self.count() {
+            let at = self.added.wrapping_sub(newer + 1) % Self::CAPACITY as u8;
             let event = self.events.get(usize::from(at)).copied();
             adu.extend(&[event.unwrap_or_default()]);
         }

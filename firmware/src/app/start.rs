@@ -176,7 +176,8 @@ pub fn up(
         // The count may begin just before a tick.
         let longest_ms = (limit_us / 1000) as u16 + 2;
         let port = Port::new(receiver, adus);
-        let (bit, us) = gap.bit_and_us();
+        // Without function 70 nothing needs these times.
+        let (bit, us) = if HAS_EVENTS { gap.bit_and_us() } else { (0, 0) };
         Some(Line::new(
             uart,
             gap,

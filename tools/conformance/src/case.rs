@@ -50,6 +50,8 @@ pub enum Kind {
     Standard,
     /// An interpretation of the standards, where they leave a choice or say nothing.
     Interpretation,
+    /// An extension of a maker, which other units may have.
+    Extension,
     /// The register map and the documents of the modio.
     Modio,
 }
@@ -60,6 +62,7 @@ impl Kind {
         match self {
             Self::Standard => "standard",
             Self::Interpretation => "interpretation",
+            Self::Extension => "extension",
             Self::Modio => "modio",
         }
     }
@@ -90,8 +93,8 @@ impl Case {
     }
 }
 
-/// Returns a case. Its kind is [`Kind::Modio`] when it needs a modio or cites the register map, and
-/// [`Kind::Standard`] otherwise.
+/// Returns a case. Its kind is [`Kind::Modio`] when it needs a modio or cites the register map, [`Kind::Extension`] when
+/// it cites Fast Modbus, and [`Kind::Standard`] otherwise.
 pub const fn case(
     name: &'static str,
     section: &'static str,
@@ -109,7 +112,11 @@ pub const fn case(
     Case {
         name,
         section,
-        kind: if modio { Kind::Modio } else { Kind::Standard },
+        kind: match source {
+            _ if modio => Kind::Modio,
+            [b'F', b'a', b's', b't', ..] => Kind::Extension,
+            _ => Kind::Standard,
+        },
         about,
         needs,
         run,

@@ -104,7 +104,7 @@ pub struct Cli {
     #[arg(long, value_name = "PATTERN")]
     pub exclude: Vec<String>,
 
-    /// Run only the cases of the kind standard: no interpretations, and no cases about the modio
+    /// Run only the cases of the kind standard: no interpretations, no extensions, and no cases about the modio
     #[arg(long, conflicts_with = "strict")]
     pub standard_only: bool,
 

@@ -187,6 +187,8 @@ pub fn response_length(request: &[u8], frame: &[u8]) -> Option<usize> {
         0x16 => Some(10),
         0x18 => fifo_length(frame),
         0x2B => identification_length(frame),
+        // Fast Modbus: which points report events.
+        0x46 if frame.get(2) == Some(&0x18) => counted(3),
         _ => None,
     }
 }
@@ -207,6 +209,7 @@ pub fn request_length(frame: &[u8]) -> Option<usize> {
         0x17 => counted(10),
         0x18 => Some(6),
         0x2B if frame.get(2) == Some(&0x0E) => Some(7),
+        0x46 if frame.get(2) == Some(&0x18) => counted(3),
         _ => None,
     }
 }
@@ -311,6 +314,10 @@ mod tests {
         assert_eq!(response_length(&[0x2B, 14, 1, 0], &identity), Some(17));
         assert_eq!(response_length(&[0x2B, 14, 1, 0], &identity[..11]), None);
         assert_eq!(response_length(&[0x41], &[1, 0x41, 5]), None);
+        assert_eq!(
+            response_length(&[0x46, 0x18, 0], &[1, 0x46, 0x18, 3]),
+            Some(9)
+        );
         let fifo = [1, 0x18, 0, 6, 0, 2];
         assert_eq!(response_length(&[0x18, 0, 1], &fifo), Some(12));
     }

@@ -8,9 +8,10 @@
 //! | [`decode`] | frames, requests and responses in words, as in `modioctl sniff` and the simulator's frame log |
 //! | [`capture`] | capture files that Wireshark reads |
 //! | `port` | opens a serial port, with the feature `port` |
+//! | [`fast`] | Fast Modbus, function 70: messages, scans and events |
 //! | [`exact`] | the exact-line protocol: a serial line in virtual time |
 //!
-//! The crate only implements the standard and this protocol: it knows no device and has no clock.
+//! The crate only implements the standard, this protocol and one extension: it knows no device and has no clock.
 //!
 //! ```
 //! use modbus_line::{Direction, adu::Framing, decode};
@@ -27,6 +28,7 @@ pub mod adu;
 pub mod capture;
 pub mod decode;
 pub mod exact;
+pub mod fast;
 mod format;
 pub mod names;
 #[cfg(feature = "port")]

@@ -1,5 +1,7 @@
 //! The command line.
 
+mod fast;
+
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -10,6 +12,8 @@ use crate::bus::Options;
 use crate::bus::endpoint::{RATES, duration};
 use crate::export::ExportFormat;
 use crate::names::port_number;
+
+pub use fast::{Address, Events, High};
 
 /// Finds, sets up, watches and updates modio units over Modbus
 #[derive(Parser, Debug)]
@@ -71,6 +75,10 @@ pub enum Command {
     Config(Config),
     /// Print values repeatedly, until Ctrl-C
     Watch(Watch),
+    /// Print what changes in all units, as soon as it does, until Ctrl-C (Fast Modbus)
+    Events(Events),
+    /// Set the address of a unit, which is found by its serial number (Fast Modbus)
+    Address(Address),
     /// Show the unit on the whole screen: live values, outputs to switch, chart, counters, frames
     Monitor(Monitor),
     /// Send a PDU and show both frames
@@ -101,8 +109,15 @@ pub enum Command {
 #[command(after_help = "\
 Each address has 25 ms to answer. Silent addresses are asked once more, with 150 ms each: about 40 s for all. Ctrl-C keeps \
 what was found. With --timeout there is a single pass that waits so long: for a RESPONSE_DELAY above 100 ms, or over the \
-air.")]
+air.
+
+--fast takes about 0.2 s for each unit at 9600 bit/s, and also finds units with the same address. It finds units with \
+Fast Modbus (function 70) in RTU, such as a modio-08 whose crystal runs, also those of other makers. While units of \
+several makers are on the line, a unit may be missing: their arbitration can differ.")]
 pub struct Scan {
+    /// Let units report themselves with their serial numbers, instead of asking every address
+    #[arg(long, conflicts_with = "units")]
+    pub fast: bool,
     /// Addresses to ask, such as 1-20,40
     #[arg(long, value_name = "LIST", default_value = "1-247", value_parser = units)]
     pub units: List<u8>,

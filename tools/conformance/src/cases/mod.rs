@@ -9,6 +9,7 @@ mod damage;
 mod diagnostics;
 mod dispatch;
 mod events;
+mod fast;
 mod files;
 mod framing;
 mod gaps;
@@ -52,6 +53,7 @@ pub fn all() -> Vec<Case> {
         bus::CASES,
         timing::CASES,
         ascii::CASES,
+        fast::CASES,
         worked::CASES,
         hurts::CASES,
         outputs::CASES,
@@ -87,7 +89,7 @@ mod tests {
         for case in all() {
             assert!(names.insert(case.name), "{} twice", case.name);
             assert!(case.name.contains('/') && !case.name.contains(' '));
-            let known = ["V1.02 ", "V1.1b3 ", "map", "manual"];
+            let known = ["V1.02 ", "V1.1b3 ", "Fast Modbus", "map", "manual"];
             assert!(
                 known.iter().any(|source| case.section.starts_with(source)),
                 "{}: {}",

@@ -272,4 +272,18 @@ faults! {
     TakesRtuInAscii => ["ascii/rtu-frame"],
     /// Keeps a truncated ASCII frame when a colon is received.
     KeepsTruncated => ["ascii/truncated"],
+    /// Takes part in a scan again after it was found.
+    FoundAgain => ["fast/scan"],
+    /// Answers requests to any serial number.
+    AnswersAnySerial => ["fast/other-serial"],
+    /// Refuses requests to its serial number.
+    RefusesBySerial => ["fast/by-serial"],
+    /// Refuses unknown requests of function 70 that are for all units.
+    AnswersUnknownToAll => ["fast/unknown-to-all"],
+    /// Echoes unknown sub-functions of function 70.
+    EchoesUnknownFast => ["fast/unknown-to-unit"],
+    /// Does not check the length of a list of settings of function 70.
+    IgnoresSettingsLength => ["fast/settings"],
+    /// Sends events once, also if they are not confirmed.
+    ForgetsEvents => ["fast/events"],
 }

@@ -3,6 +3,7 @@
 
 mod command;
 mod endpoint;
+mod fast;
 mod fault;
 mod modio;
 mod modio_fault;

@@ -6,10 +6,11 @@ use std::time::Duration;
 use conformance::endpoint::Received;
 use conformance::frame::Mode;
 
-use modbus_line::LineFormat;
+use modbus_line::{LineFormat, fast};
 use modbus_reference::server::{BUS, ERRORS};
 use modbus_reference::{Server as Reference, crc, framed, lrc};
 
+use super::fast::Fast;
 use super::fault::Fault;
 use super::modio::{self, Modio};
 use super::modio_fault::ModioFault;
@@ -34,7 +35,7 @@ pub struct Character {
 /// The unit.
 pub struct Unit {
     pub server: Server,
-    reference: Reference,
+    pub reference: Reference,
     pub address: u8,
     pub mode: Mode,
     pub line: LineFormat,
@@ -48,6 +49,7 @@ pub struct Unit {
     pub sent: VecDeque<Received>,
     pub edges: Vec<(Duration, bool)>,
     pub echo: bool,
+    pub fast: Fast,
     open: Vec<u8>,
     damaged: bool,
     late: bool,
@@ -77,6 +79,7 @@ impl Unit {
             sent: VecDeque::new(),
             edges: Vec::new(),
             echo: false,
+            fast: Fast::default(),
             open: Vec::new(),
             damaged: false,
             late: false,
@@ -345,6 +348,10 @@ impl Unit {
         if self.dead || std::mem::take(&mut self.deaf) {
             return;
         }
+        if self.has_fast() && unit == fast::ADDRESS && pdu[0] == fast::FUNCTION {
+            self.serve_all_units(pdu, at);
+            return;
+        }
         if !mine {
             if self.server.has(Fault::LogsOthers) {
                 self.reference.log.push(0x80);
@@ -378,7 +385,11 @@ impl Unit {
         if self.silent_to_incomplete_writes && !is_complete(pdu) {
             return;
         }
-        let reply = self.server.request(&mut self.reference, broadcast, pdu);
+        let reply = if pdu[0] == fast::FUNCTION && self.has_fast() && !broadcast {
+            Some(self.settings(pdu))
+        } else {
+            self.server.request(&mut self.reference, broadcast, pdu)
+        };
         if let Some(reply) = reply {
             if self.server.modio_has(ModioFault::RestartsBeforeReply) {
                 self.restart(at);
@@ -390,6 +401,11 @@ impl Unit {
         }
     }
 
+    /// Whether the unit has function 70: in RTU, and not as a modio, which the suite asks for functions that it lacks.
+    const fn has_fast(&self) -> bool {
+        matches!(self.mode, Mode::Rtu) && self.server.modio.is_none()
+    }
+
     /// Restarts a modio after the command to restart.
     fn restart(&mut self, at: Duration) {
         if let Some(modio) = self.server.modio.as_mut().filter(|modio| modio.restart) {
@@ -397,7 +413,7 @@ impl Unit {
         }
     }
 
-    fn send(&mut self, body: &[u8], at: Duration) {
+    pub fn send(&mut self, body: &[u8], at: Duration) {
         let delimiter = (self.mode == Mode::Ascii).then_some(b'\n');
         let mut frame = framed(delimiter, body[0], &body[1..]);
         if self.server.has(Fault::TrailingZero) {

@@ -2,6 +2,7 @@
 
 mod broadcast;
 pub mod endpoint;
+mod fast;
 mod master;
 mod stream;
 mod sweep;
@@ -9,6 +10,7 @@ mod sweep;
 pub use modbus_line::{Direction, Waiting, adu, decode};
 
 pub use endpoint::{Endpoint, Options, Place};
+pub(crate) use fast::{check_line, shared};
 pub use master::{Lost, MOST, Master, Observer, Seen};
 pub(crate) use stream::Stream;
 pub use sweep::{Found, LONG, REPORT, SHORT};

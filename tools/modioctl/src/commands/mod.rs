@@ -3,6 +3,7 @@
 mod config;
 mod describe;
 mod export;
+mod fast;
 mod info;
 mod module;
 mod ports;
@@ -33,13 +34,17 @@ const INTERRUPTED: u8 = 130;
 pub async fn run(mut cli: Cli) -> Result<ExitCode, Failure> {
     let until_stopped = matches!(
         cli.command,
-        Command::Watch(_) | Command::Monitor(_) | Command::Sniff(_)
+        Command::Watch(_) | Command::Events(_) | Command::Monitor(_) | Command::Sniff(_)
     );
     if let Command::Scan(options) = &cli.command {
         let options = options.clone();
         let endpoint = endpoint(&mut cli)?;
         let observer = cli.trace.then(trace::to_stderr);
-        let complete = scan::run(endpoint, observer, &options, cli.json).await?;
+        let complete = if options.fast {
+            fast::scan::run(endpoint, observer, &options, cli.json).await?
+        } else {
+            scan::run(endpoint, observer, &options, cli.json).await?
+        };
         return Ok(if complete {
             ExitCode::SUCCESS
         } else {
@@ -107,6 +112,8 @@ async fn dispatch(mut cli: Cli, note: &Note) -> Result<(), Failure> {
         Command::Module(options) => module::run(device, options).await,
         Command::Config(options) => config::run(device, options, json, note).await,
         Command::Watch(options) => watch::run(device, &options).await,
+        Command::Events(options) => fast::events::run(device, &options, json).await,
+        Command::Address(options) => fast::address::run(device.master, &options).await,
         Command::Raw(options) => raw::run(&mut device, &options).await,
         Command::Describe => describe::run(&mut device, json).await,
         Command::Export(options) => export::run(&mut device, &options).await,

@@ -91,7 +91,7 @@ pub async fn run(
 
 /// Returns the lines to try: each rate with each format. RTU needs 8 data bits, so formats with 7 are tried in ASCII
 /// mode.
-fn lines(endpoint: &Endpoint, options: &Scan) -> Vec<Endpoint> {
+pub fn lines(endpoint: &Endpoint, options: &Scan) -> Vec<Endpoint> {
     let rates = options.rates.clone().unwrap_or(vec![endpoint.baud]);
     let formats = options.formats.clone().unwrap_or(vec![endpoint.format]);
     let line = |baud, format: Format| Endpoint {

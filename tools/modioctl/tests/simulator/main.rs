@@ -7,6 +7,7 @@
 mod bus;
 mod commands;
 mod errors;
+mod fast;
 mod gateway;
 mod hostile;
 mod importing;

@@ -43,6 +43,19 @@ impl Unit {
         Self::run(&options)
     }
 
+    /// Starts the boards of a file for `--bus` on one line.
+    pub fn bus(boards: &str) -> Self {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), boards).unwrap();
+        let elf_08 = format!("modio-08={}", path("MODIO_ELF_08").display());
+        let files = [
+            ("--elf", path("MODIO_ELF")),
+            ("--elf", elf_08.into()),
+            ("--bus", file.path().to_owned()),
+        ];
+        Self::start_with(&files, &[])
+    }
+
     /// Starts a modio-02 with address 1, which has a loader and runs the image of the [`update_file`] for slot A.
     pub fn with_loader() -> Self {
         let (loader, image) = (path("MODIO_LOADER"), update_file());
