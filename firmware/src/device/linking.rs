@@ -6,9 +6,13 @@ use super::Device;
 use crate::links::{Link, OF_A_SLOT};
 
 impl<const SLOTS: usize> Device<SLOTS> {
-    /// Runs the links to the outputs of a slot with the inputs of a scan of all slots. The levels at the first scan are no
-    /// edges.
+    /// Ends the pulses of a slot's outputs, and runs the links to them with the inputs of a scan of all slots. The levels at
+    /// the first scan are no edges.
     pub fn run_links(&mut self, slot: usize) {
+        let now = self.state.millis();
+        if let Some(port) = self.points.ports_mut().get_mut(slot) {
+            port.end_pulses(now);
+        }
         if self.has_links {
             let act = self.linked >> (slot & 7) & 1 != 0;
             self.update_links(slot, act);

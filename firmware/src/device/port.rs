@@ -75,16 +75,9 @@ impl IoPort {
 
     /// Stores the inputs of a scan. Outputs keep their commanded values, which may have changed during the scan.
     /// The settings may have changed, too: then the words of the scan have the wrong unit and are ignored (`words`
-    /// is false). `now` is the uptime in ms, not 0. Ends pulses. Returns the digital inputs that have changed, channel 1 in
-    /// bit 0.
+    /// is false). `now` is the uptime in ms, not 0. Returns the digital inputs that have changed, channel 1 in bit 0.
     pub fn scanned(&mut self, scanned: &Channels, words: bool, now: u32) -> u8 {
         let mut changed = 0;
-        for channel in 0..CHANNELS {
-            let is_over = |end: &u32| *end != 0 && now.wrapping_sub(*end).cast_signed() >= 0;
-            if self.pulse_ends.get(channel).is_some_and(is_over) {
-                self.set_output(channel, false);
-            }
-        }
         let inputs = self.pulses.iter_mut().zip(&mut self.edges);
         for (channel, (kind, (pulses, edge))) in self.kinds.iter().zip(inputs).enumerate() {
             match kind {
@@ -119,6 +112,16 @@ impl IoPort {
         self.channels.set_bit(channel, value);
         if let Some(end) = self.pulse_ends.get_mut(channel) {
             *end = 0;
+        }
+    }
+
+    /// Clears the outputs whose pulse ends at the uptime `now` in ms.
+    pub(super) fn end_pulses(&mut self, now: u32) {
+        for channel in 0..CHANNELS {
+            let is_over = |end: &u32| *end != 0 && now.wrapping_sub(*end).cast_signed() >= 0;
+            if self.pulse_ends.get(channel).is_some_and(is_over) {
+                self.set_output(channel, false);
+            }
         }
     }
 
