@@ -107,7 +107,10 @@ impl Life {
         if reads_otherwise && pages::nothing_good(&self.flash.pages) {
             // An interrupted erase may leave data that looks like something stored at one start and like nothing at
             // the next.
-            self.expected = vec![Found::good(&Settings::defaults(&MODIO_02)), Found::damaged()];
+            self.expected = vec![
+                Found::good(&Settings::defaults(&MODIO_02)),
+                Found::damaged(),
+            ];
         }
     }
 
