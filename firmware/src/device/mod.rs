@@ -148,7 +148,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
         description: &'static Fixed,
     ) -> &'a mut Self {
         let device = place.write(Self {
-            points: Points::new(config.board().points().start, config.modules()),
+            points: Points::new(&config),
             state: State::new(config.board(), identity),
             description: Description::new(description, &config),
             comm_watchdog: CommWatchdog::new(),
