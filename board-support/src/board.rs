@@ -74,7 +74,6 @@ pub struct Board {
 
 /// The RS-485 line before it is set up.
 pub struct LineOff {
-    usart: pac::USART1,
     timer: pac::TIM2,
     start_bit: pac::TIM1,
     clock: ClockSource,
@@ -93,7 +92,7 @@ impl LineOff {
         let clock = self.clock;
         let (timer, start_bit) = (self.timer, self.start_bit);
         let gap = Rs485Timer::new(timer, start_bit, settings, times, clock, rcc)?;
-        let line = Rs485::new(self.usart, settings, clock, rcc)?;
+        let line = Rs485::new(settings, clock, rcc)?;
         Some((line, gap))
     }
 }
@@ -135,8 +134,13 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
 
     // Allow a debug probe to read the log while the core sleeps.
     device.DBGMCU.cr().modify(|_, w| w.dbg_sleep().set_bit());
-    // TIM1 is connected to PA10 through the alternate-function block, in its reset mapping.
+    // It connects TIM1 to PA10 in its reset mapping, and ports to external interrupts.
     pac::AFIO::enable(&mut rcc);
+    // The setting of the debug port cannot be read, so the register is written as a whole.
+    if BOARD.mapr != 0 {
+        // SAFETY: the board's descriptor has a valid value.
+        device.AFIO.mapr().write(|w| unsafe { w.bits(BOARD.mapr) });
+    }
     pac::ADC1::enable(&mut rcc);
     pac::I2C1::enable(&mut rcc);
     pac::PWR::enable(&mut rcc);
@@ -160,7 +164,6 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
         scan_timer: ScanTimer::new(device.TIM4, clock, &mut rcc),
         watchdog,
         line: LineOff {
-            usart: device.USART1,
             timer: device.TIM2,
             start_bit: device.TIM1,
             clock,

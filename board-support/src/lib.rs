@@ -18,6 +18,7 @@ pub mod line;
 pub mod pages;
 mod pin;
 pub mod uart;
+mod usart;
 
 #[cfg(target_os = "none")]
 mod adc;
@@ -27,8 +28,12 @@ pub mod board;
 mod clock;
 #[cfg(target_os = "none")]
 mod crc_unit;
+#[cfg(target_os = "none")]
+pub mod device;
 #[cfg(any(target_os = "none", test))]
 mod dip;
+#[cfg(target_os = "none")]
+mod edge;
 #[cfg(target_os = "none")]
 pub mod flash;
 #[cfg(target_os = "none")]

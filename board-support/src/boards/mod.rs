@@ -2,25 +2,38 @@
 //! register-map, which the linker script has from there.
 //!
 //! A cargo feature with the board's name selects the board. [`board`](crate::board) holds what all boards share:
-//! the RS-485 line on PA8 to PA10, the radio's UART on PB10 and PB11, the DACs' bus on PB6 and PB7, the LEDs on PB8,
+//! the radio's UART on PB10 and PB11, the DACs' bus on PB6 and PB7, the LEDs on PB8,
 //! PB9 and PC13.
 
 pub mod modio_02;
 pub mod modio_08;
 
-use crate::pin::Pin;
+use crate::{pin::Pin, usart::Usart};
 
 /// A board.
 #[derive(Clone, Copy, Debug)]
 pub struct Descriptor {
     /// The board's name, as in its row in crate register-map.
     pub name: &'static str,
+    /// AFIO_MAPR, which is written once: remapped pins, and whether the pins of the debug port are free (RM0008 9.4.2).
+    pub mapr: u32,
+    /// The RS-485 line.
+    pub line: LinePins,
     /// The slots in the order of their ports. The port numbers are consecutive.
     pub slots: &'static [SlotPins],
     /// The pins of SW01, position 1 first. A position that is ON connects its pin to ground.
     pub switch: [Pin; 8],
     /// The pins of the LoRa radio, besides its UART on PB10 and PB11.
     pub radio: RadioPins,
+}
+
+/// The UART of the RS-485 line and its pins.
+#[derive(Clone, Copy, Debug)]
+pub struct LinePins {
+    /// The UART, whose pins for TX and RX follow from it.
+    pub uart: Usart,
+    /// Driver enable of the transceiver: high turns the driver on.
+    pub driver: Pin,
 }
 
 /// The pins and the DAC address of a slot.
@@ -39,6 +52,32 @@ pub struct RadioPins {
     pub mode: [Pin; 2],
     /// AUX, which is low while the radio is busy.
     pub aux: Pin,
+}
+
+impl LinePins {
+    /// Returns the pin whose edges raise an interrupt: RX, unless a timer captures them.
+    #[must_use]
+    pub const fn edge(&self) -> Option<Pin> {
+        if self.uart.is_captured() {
+            None
+        } else {
+            Some(self.uart.rx())
+        }
+    }
+
+    /// Returns the bits of the line's pins in a configuration register.
+    #[must_use]
+    pub const fn mode_bits(&self, register: u32) -> u32 {
+        let pins = [self.driver, self.uart.tx(), self.uart.rx()];
+        let (mut bits, mut n) = (0, 0);
+        while n < pins.len() {
+            if pins[n].mode_register() == register {
+                bits |= pins[n].mode_bits();
+            }
+            n += 1;
+        }
+        bits
+    }
 }
 
 impl Descriptor {
@@ -65,7 +104,7 @@ const _: () = modio_02::BOARD.check();
 const _: () = modio_08::BOARD.check();
 
 // Set exactly one board feature. With two features BOARD is defined twice, without one it is not defined.
-#[cfg(feature = "modio-02")]
+#[cfg(any(feature = "modio-02", test))]
 pub use modio_02::BOARD;
 #[cfg(feature = "modio-08")]
 pub use modio_08::BOARD;

@@ -1,11 +1,16 @@
 //! The modio-02: an STM32F103CB, or a C8 on a bare "Blue Pill" with a transceiver. One slot, port 5.
 
-use super::{Descriptor, RadioPins, SlotPins};
-use crate::pin::Pin;
+use super::{Descriptor, LinePins, RadioPins, SlotPins};
+use crate::{pin::Pin, usart::Usart};
 
 /// The modio-02.
 pub const BOARD: Descriptor = Descriptor {
     name: "modio-02",
+    mapr: 0,
+    line: LinePins {
+        uart: Usart::Usart1,
+        driver: Pin::a(8),
+    },
     slots: &[SlotPins {
         lines: [Pin::a(0), Pin::a(1), Pin::a(2), Pin::a(3)],
         dac_address: 0x60,

@@ -1,11 +1,16 @@
 //! The modio-08: an STM32F103RC. Four slots, ports 1 to 4.
 
-use super::{Descriptor, RadioPins, SlotPins};
-use crate::pin::Pin;
+use super::{Descriptor, LinePins, RadioPins, SlotPins};
+use crate::{pin::Pin, usart::Usart};
 
 /// The modio-08.
 pub const BOARD: Descriptor = Descriptor {
     name: "modio-08",
+    mapr: 0,
+    line: LinePins {
+        uart: Usart::Usart1,
+        driver: Pin::a(8),
+    },
     slots: &[
         SlotPins {
             lines: [Pin::a(0), Pin::a(1), Pin::a(2), Pin::a(3)],
