@@ -14,6 +14,7 @@ pub mod config;
 pub mod device;
 pub mod leds;
 pub mod line;
+pub mod links;
 pub mod radio;
 pub mod repairs;
 pub mod start_up;

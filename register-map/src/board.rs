@@ -6,7 +6,7 @@ use core::str::FromStr;
 
 use crate::layout::{Layout, TwoPages};
 use crate::part::{KIB, Part, STM32F103C8, STM32F103CB, STM32F103RC};
-use crate::points;
+use crate::{BLOCKS, Block, links, points};
 
 /// A board that the firmware is built for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,7 +89,7 @@ const ROWS: [Row; 2] = [
             part: STM32F103RC,
             smaller: None,
             stack: 11 * KIB,
-            budget: [60 * KIB, 13 * KIB],
+            budget: [63 * KIB, 13 * KIB],
             interrupts: ["USART1", "USART3", "EXTI3"],
         },
     },
@@ -171,6 +171,13 @@ impl Board {
     #[must_use]
     pub const fn ports(&self) -> Range<u16> {
         self.first_port..self.first_port + self.slots
+    }
+
+    /// Iterates over the blocks of registers of the board, in ascending order of the addresses.
+    pub fn blocks(&self) -> impl Iterator<Item = &'static Block> + use<> {
+        let has_links = links::exist(self.slots.into());
+        let blocks = BLOCKS.into_iter();
+        blocks.filter(move |block| has_links || block.first != links::LINKS)
     }
 
     /// Returns whether a port has a slot.

@@ -133,6 +133,7 @@ fn spans_are_the_addresses_of_the_rules_with_adjacent_ones_joined() {
         (radio::RULES, radio::SPANS),
         (counters::RULES, counters::SPANS),
         (edges::RULES, edges::SPANS),
+        (links::RULES, links::SPANS),
     ];
     for (rules, spans) in blocks {
         let of_rules = rules.iter().flat_map(|rule| rule.addresses());

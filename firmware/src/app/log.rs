@@ -160,7 +160,7 @@ impl Log {
             }
         }
         if start.config_invalid {
-            let text = "WARN configuration: the stored settings are damaged, defaults are in force";
+            let text = "WARN the stored settings are damaged: defaults are in force";
             self.write(&mut Line::of(text));
         }
         for (port, module) in BOARD.ports().zip(start.modules) {
@@ -185,13 +185,11 @@ impl Log {
             Event::ModuleGood(port) => line.slot(port).text("the module works again"),
             Event::CommunicationLost => line.text("WARN communication lost: outputs go to SAFE"),
             Event::Saved => line.text("configuration saved"),
-            Event::SaveFailed => line.text("WARN configuration: the flash could not be written"),
+            Event::SaveFailed => line.text("WARN the flash could not be written"),
             Event::LineRepaired => line.text("WARN line: set up again after a disturbance"),
             Event::Radio(true) => line.text("radio: ready"),
             Event::Radio(false) => line.text("WARN radio: the module does not answer"),
-            Event::LowSupply => {
-                line.text("WARN configuration: the supply is too low, the flash has to wait")
-            }
+            Event::LowSupply => line.text("WARN the supply is too low: the flash has to wait"),
         });
     }
 

@@ -4,6 +4,7 @@ use board_support::{Sampler, boards::SLOTS, device::interrupt, kept};
 use firmware::{alive, device::IoPort, leds::TICK_MS};
 use heapless::spsc::Producer;
 use modio_drivers::{Channels, DacLink, ModuleError};
+use register_map::links;
 use rtic::Mutex;
 
 use crate::{
@@ -127,6 +128,10 @@ impl Scanning {
                 }
             }
         });
+        if beat && links::exist(SLOTS) {
+            // Under a lock for each slot, because requests wait for it.
+            (0..SLOTS).for_each(|slot| device.lock(|device| device.run_links(slot)));
+        }
         if tripped {
             enqueue(events, Event::CommunicationLost);
         }

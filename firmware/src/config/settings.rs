@@ -3,7 +3,9 @@
 use register_map::codes::{Format, Mode};
 use register_map::configuration::{self, COMMAND, FORMAT, KEY, MODE, MODULE, RULES};
 use register_map::points::{self, Kind};
-use register_map::{Board, InForce, Module, Rule, rule_at};
+use register_map::{Board, InForce, Module, Rule, links, rule_at};
+
+use super::links::Links;
 
 /// High byte of every configuration address. The low byte is the index in [`Settings`].
 const PAGE: u16 = KEY >> 8;
@@ -15,19 +17,26 @@ pub(super) const RESTARTS: usize = restarts();
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RestartValues(pub(super) [u16; RESTARTS]);
 
-/// A value for every register of the configuration. The values are consistent: a setting by point is always one
-/// that the point's module allows.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Settings {
+/// A value for every register of the configuration, and the links of the points in `SLOTS` slots. The values are
+/// consistent: a setting by point is always one that the point's module allows, and so is a link.
+// `Copy`, because copies of its parts one after another take more flash. Aligned, so that it is copied by words: requests
+// wait for the copy.
+#[repr(align(4))]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings<const SLOTS: usize> {
     /// Indexed by the low byte of the address. KEY, COMMAND and gaps hold 0.
     values: [u16; 256],
+    pub(super) links: Links<SLOTS>,
 }
 
-impl Settings {
-    /// Returns the factory settings.
+impl<const SLOTS: usize> Settings<SLOTS> {
+    /// Returns the factory settings of a board.
     #[must_use]
-    pub fn defaults() -> Self {
-        let mut settings = Self { values: [0; 256] };
+    pub fn defaults(board: &Board) -> Self {
+        let mut settings = Self {
+            values: [0; 256],
+            links: Links::new(board.points().start),
+        };
         for (rule, address) in Addresses::from(KEY) {
             settings.put(address, rule.default);
         }
@@ -38,17 +47,21 @@ impl Settings {
     /// this board does not allow and that have their default instead. Unknown addresses are ignored.
     #[must_use]
     pub fn load(board: &Board, pairs: impl Iterator<Item = (u16, u16)>) -> (Self, u16) {
-        let mut settings = Self::defaults();
+        let mut settings = Self::defaults(board);
         let mut rejected: u16 = 0;
         // Pairs are in ascending order. So the modules, which determine which settings by point are allowed, come before
         // these.
         for (address, value) in pairs {
-            let Some((rule, _)) = rule_at(RULES, address).filter(|(rule, _)| holds(rule)) else {
-                continue;
+            let rule = rule_at(RULES, address).filter(|(rule, _)| holds(rule));
+            let allowed = match rule {
+                Some((rule, _)) => {
+                    let port = port_of(address);
+                    rule.values_for(settings.kind_at(address)).allow(value)
+                        && port.is_none_or(|port| takes_module(board, port, value))
+                }
+                None if Links::<SLOTS>::contain(address) => settings.has_link(address),
+                None => continue,
             };
-            let port = port_of(address);
-            let allowed = rule.values_for(settings.kind_at(address)).allow(value)
-                && port.is_none_or(|port| takes_module(board, port, value));
             if allowed {
                 settings.set(address, value);
             } else {
@@ -60,6 +73,7 @@ impl Settings {
             settings.put(FORMAT, Format::F8N2.code());
             rejected = rejected.saturating_add(1);
         }
+        let rejected = rejected.saturating_add(settings.drop_links(None));
         (settings, rejected)
     }
 
@@ -70,7 +84,7 @@ impl Settings {
         let [page, place] = address.to_be_bytes();
         match self.values.get(usize::from(place)) {
             Some(value) if u16::from(page) == PAGE => *value,
-            _ => 0,
+            _ => self.links.at(address).map_or(0, |link| link.word(address)),
         }
     }
 
@@ -88,9 +102,12 @@ impl Settings {
         Module::from_code(self.get(address)).unwrap_or(Module::None)
     }
 
-    /// Returns the kind of a point, 0 to 31, with the chosen module.
+    /// Returns the kind of a point with the chosen module; none above 31.
     #[must_use]
     pub fn kind(&self, point: u16) -> Kind {
+        if point >= points::COUNT {
+            return Kind::None;
+        }
         let kinds = self.module(point / points::CHANNELS + 1).points();
         let channel = usize::from(point % points::CHANNELS);
         kinds.get(channel).copied().unwrap_or(Kind::None)
@@ -98,10 +115,11 @@ impl Settings {
 
     /// Returns every setting from this address on that differs from its default, in ascending order.
     #[must_use]
-    pub const fn changed_from(&self, first: u16) -> Changed<'_> {
+    pub fn changed_from(&self, first: u16) -> Changed<'_, SLOTS> {
         Changed {
             settings: self,
             held: Addresses::from(first),
+            links: first.max(links::LINKS),
         }
     }
 
@@ -131,9 +149,7 @@ impl Settings {
 
     /// Returns the number of settings that differ from those of `from`.
     pub(super) fn differences(&self, from: &Self) -> u16 {
-        let pairs = self.values.iter().zip(&from.values);
-        // There are at most 256.
-        pairs.map(|(a, b)| u16::from(a != b)).sum()
+        differences(&self.values, &from.values).wrapping_add(self.links.differences(&from.links))
     }
 
     /// Returns whether a setting that needs a restart differs from its value in force since the start.
@@ -180,14 +196,22 @@ impl Settings {
                 }
             }
         }
+        self.drop_links(Some(self.links.slot_of(first)));
     }
 
     fn put(&mut self, address: u16, value: u16) {
-        let [_, place] = address.to_be_bytes();
-        if let Some(held) = self.values.get_mut(usize::from(place)) {
+        let [page, place] = address.to_be_bytes();
+        if Links::<SLOTS>::EXIST && u16::from(page) != PAGE {
+            self.links.set(address, value);
+        } else if let Some(held) = self.values.get_mut(usize::from(place)) {
             *held = value;
         }
     }
+}
+
+/// Returns the number of words that differ. There are at most 256.
+pub(super) fn differences(a: &[u16], b: &[u16]) -> u16 {
+    a.iter().zip(b).map(|(a, b)| u16::from(a != b)).sum()
 }
 
 /// Returns whether a value of FORMAT is compatible with a value of MODE.
@@ -248,18 +272,19 @@ impl Iterator for Addresses {
 }
 
 /// Iterates over the settings that differ from their defaults, see [`Settings::changed_from`].
-pub struct Changed<'a> {
-    settings: &'a Settings,
+pub struct Changed<'a, const SLOTS: usize> {
+    settings: &'a Settings<SLOTS>,
     held: Addresses,
+    /// The register of a link that is next, after all others.
+    links: u16,
 }
 
-impl Iterator for Changed<'_> {
+impl<const SLOTS: usize> Iterator for Changed<'_, SLOTS> {
     type Item = (u16, u16);
 
     #[inline(never)]
     fn next(&mut self) -> Option<(u16, u16)> {
-        loop {
-            let (rule, address) = self.held.next()?;
+        for (rule, address) in self.held.by_ref() {
             let value = self.settings.get(address);
             let default = match rule.narrower {
                 Some(_) => rule.default_for(self.settings.kind_at(address)),
@@ -269,6 +294,14 @@ impl Iterator for Changed<'_> {
                 return Some((address, value));
             }
         }
+        while Links::<SLOTS>::contain(self.links) {
+            let address = self.links;
+            self.links = address.wrapping_add(1);
+            if let Some(value) = self.settings.links.changed(address) {
+                return Some((address, value));
+            }
+        }
+        None
     }
 }
 

@@ -82,6 +82,11 @@ impl<const SLOTS: usize> Points<SLOTS> {
         Some((self.ports.get_mut(index / CHANNELS)?, index % CHANNELS))
     }
 
+    /// Returns the port and the channel of a point.
+    pub(super) fn place_of(&self, point: u16) -> Option<(&IoPort, usize)> {
+        self.place(self.index(point))
+    }
+
     /// Returns the status of a point, 0 to 31: good for a point that does not exist.
     #[must_use]
     pub fn status_of(&self, point: u16) -> ChannelStatus {
@@ -186,7 +191,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
     pub fn write_bits(&mut self, span: Span, bits: Bits<'_>) {
         for (index, bit) in self.indices(span).zip(bits.iter()) {
             if let Some((port, channel)) = self.place_mut(index) {
-                port.channels.set_bit(channel, bit);
+                port.set_output(channel, bit);
             }
         }
     }

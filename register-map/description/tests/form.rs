@@ -2,8 +2,8 @@
 
 use minicbor::Encoder;
 use modio_description::{
-    Description, Error, FILE, HEAD, Narrower, PORT_BYTES, Port, Reading, Register, Scope, Unit,
-    VERSION, Value, Values, checksum, describe, records,
+    Description, Error, FILE, Field, HEAD, Narrower, PORT_BYTES, Port, Reading, Register, Scope,
+    Unit, VERSION, Value, Values, checksum, describe, records,
 };
 use proptest::prelude::*;
 use register_map::board::{MODIO_02, MODIO_08};
@@ -327,12 +327,28 @@ fn units() -> impl Strategy<Value = Unit> {
 }
 
 fn meanings() -> impl Strategy<Value = Value> {
+    let parts = (text(), numbers(), sets(), any::<u16>());
+    let field = parts.prop_map(|(name, value, values, default)| Field {
+        name,
+        value,
+        values,
+        default,
+    });
+    prop_oneof![
+        numbers(),
+        (0..5_u8, prop::collection::vec(field, 1..4))
+            .prop_map(|(kind, fields)| Value::Fields { kind, fields }),
+    ]
+}
+
+fn numbers() -> impl Strategy<Value = Value> {
     prop_oneof![
         units().prop_map(Value::Number),
         units().prop_map(Value::Long),
         prop::collection::vec((any::<u16>(), text()), 0..4).prop_map(Value::Codes),
         prop::collection::vec((0..16_u8, text()), 0..4).prop_map(Value::Bits),
         Just(Value::Opaque),
+        Just(Value::Point),
     ]
 }
 
@@ -346,7 +362,7 @@ fn sets() -> impl Strategy<Value = Values> {
 }
 
 fn narrowers() -> impl Strategy<Value = Narrower> {
-    let parts = (0..5_u8, sets(), any::<u16>(), prop::option::of(meanings()));
+    let parts = (0..5_u8, sets(), any::<u16>(), prop::option::of(numbers()));
     parts.prop_map(|(kind, values, default, value)| Narrower {
         kind,
         values,
