@@ -11,6 +11,7 @@ pub mod boards;
 pub mod design;
 pub mod fault;
 pub mod gap;
+pub mod gesture;
 #[cfg(any(target_os = "none", test))]
 mod i2c;
 pub mod kept;
@@ -32,6 +33,8 @@ mod crc_unit;
 pub mod device;
 #[cfg(any(target_os = "none", test))]
 mod dip;
+#[cfg(target_os = "none")]
+mod early;
 #[cfg(target_os = "none")]
 mod edge;
 #[cfg(target_os = "none")]
@@ -70,6 +73,7 @@ mod watchdog;
 #[cfg(target_os = "none")]
 pub use {
     adc::Sampler,
+    board::RecoveryPins,
     clock::ClockSource,
     crc_unit::CrcUnit,
     flash::{Flash, FlashError},

@@ -48,6 +48,18 @@ pub struct Pin {
 }
 
 impl Pin {
+    /// No pin: a channel that a port lacks.
+    pub const NONE: Self = Self {
+        port: Port::A,
+        number: 16,
+    };
+
+    /// Returns whether this is no pin.
+    #[must_use]
+    pub const fn is_none(self) -> bool {
+        self.number == Self::NONE.number
+    }
+
     /// Returns a pin of port A.
     #[must_use]
     pub const fn a(number: u8) -> Self {

@@ -1,7 +1,7 @@
 //! Which registers are compared: the table, which follows from the board's descriptor.
 
 use crate::{
-    boards::BOARD,
+    boards::{BOARD, RadioPins},
     pin::{Pin, Port},
 };
 
@@ -19,6 +19,7 @@ pub(super) const FLASH_ACR: u32 = 0x4002_2000;
 pub(super) const NVIC: u32 = 0xE000_E000;
 
 // Offsets in a port (RM0008 9.2) and in the NVIC (PM0056 4.3).
+const CRL: u32 = 0x00;
 const CRH: u32 = 0x04;
 pub(super) const ODR: u16 = 0x0C;
 pub(super) const ISER: u16 = 0x100;
@@ -40,21 +41,31 @@ const EDGE: Option<Pin> = BOARD.line.edge();
 
 /// Returns the pulls of a port. The radio changes that of AUX.
 const fn pulls(port: Port) -> Block {
-    let aux = BOARD.radio.aux;
-    let changes = if aux.port() as u8 == port as u8 {
-        1 << aux.number()
-    } else {
-        0
+    let changes = match BOARD.radio {
+        Some(RadioPins { aux, .. }) if aux.port() as u8 == port as u8 => 1 << aux.number(),
+        _ => 0,
     };
-    (port.base(), !changes, &[ODR])
+    if is_used(port) {
+        (port.base(), !changes, &[ODR])
+    } else {
+        (port.base(), 0, NONE)
+    }
 }
 
-/// Returns the modes in a configuration register, without those that [`line_modes`] has. PB6 and PB7 are without the pins
-/// between them and PB2, too, which are no outputs.
-const fn modes(register: u32) -> Block {
+const fn is_used(port: Port) -> bool {
+    port as u8 <= BOARD.last_port as u8
+}
+
+/// Returns the modes in a configuration register of a port, without those that [`line_modes`] has. On a board with DACs,
+/// PB6 and PB7 are without the pins between them and PB2, too, which are no outputs.
+const fn modes(port: Port, offset: u32) -> Block {
+    let register = port.base() + offset;
+    if !is_used(port) {
+        return (register, 0, NONE);
+    }
     let mask = match line_mask(register) {
         Some(mask) => !mask,
-        None if register == Port::B.base() => 0xFFF,
+        None if BOARD.has_dacs() && register == Port::B.base() => 0xFFF,
         None => ALL,
     };
     (register, mask, &[0])
@@ -100,14 +111,24 @@ const fn priority(interrupt: u16) -> Block {
 const GROUPS: [&[Block]; 6] = [
     // CFGR, APB2RSTR, APB1RSTR, AHBENR, APB2ENR, APB1ENR (RM0008 7.3).
     &[(RCC, ALL, &[0x04, 0x0C, 0x10, 0x14, 0x18, 0x1C])],
-    &[pulls(Port::A), pulls(Port::B), pulls(Port::C)],
     &[
-        modes(Port::A.base()),
-        modes(Port::A.base() + CRH),
-        modes(Port::B.base()),
-        modes(Port::B.base() + CRH),
-        modes(Port::C.base()),
-        modes(Port::C.base() + CRH),
+        pulls(Port::A),
+        pulls(Port::B),
+        pulls(Port::C),
+        pulls(Port::D),
+        pulls(Port::E),
+    ],
+    &[
+        modes(Port::A, CRL),
+        modes(Port::A, CRH),
+        modes(Port::B, CRL),
+        modes(Port::B, CRH),
+        modes(Port::C, CRL),
+        modes(Port::C, CRH),
+        modes(Port::D, CRL),
+        modes(Port::D, CRH),
+        modes(Port::E, CRL),
+        modes(Port::E, CRH),
         (NVIC, ALL, &[ISER, ISER + 4]),
         (NVIC, ALL, &PRIORITIES),
         priority(BOARD.line.uart.interrupt()),
