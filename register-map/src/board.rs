@@ -89,7 +89,7 @@ const ROWS: [Row; 2] = [
             part: STM32F103RC,
             smaller: None,
             stack: 11 * KIB,
-            budget: [63 * KIB, 13 * KIB],
+            budget: [63 * KIB, 14 * KIB],
             interrupts: ["USART1", "USART3", "EXTI3"],
         },
     },

@@ -32,7 +32,7 @@ fn linked(action: LinkAction) -> Vec<(u16, u16)> {
 }
 
 /// Presses or releases a button. Returns the time in us until the output has changed, and its new level.
-fn press(bench: &mut Bench, (port, channel): (u8, u8), pressed: bool) -> Option<(u64, bool)> {
+fn press(bench: &mut Bench, (port, channel): (u8, usize), pressed: bool) -> Option<(u64, bool)> {
     let (line, pin) = LINES[0][3];
     bench.board.watch_pin(line, pin);
     let now = bench.board.now();
