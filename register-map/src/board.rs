@@ -44,6 +44,9 @@ pub struct Memory {
     pub stack: u32,
     /// Bytes of flash and of RAM that the application may use. The rest is for the stack, the store and a loader.
     pub budget: [u32; 2],
+    /// Names of the interrupts to which the application binds LINE, RADIO and SERVE: those of the line's UART and of the
+    /// radio's, and an unused one.
+    pub interrupts: [&'static str; 3],
 }
 
 impl Memory {
@@ -86,6 +89,7 @@ const ROWS: [Row; 5] = [
             smaller: Some(STM32F103C8),
             stack: 9 * KIB,
             budget: [52 * KIB, 10 * KIB + 512],
+            interrupts: ["USART1", "USART3", "EXTI3"],
         },
     },
     // The larger board with an STM32F103RC: four slots, ports 1 to 4.
@@ -103,6 +107,7 @@ const ROWS: [Row; 5] = [
             smaller: None,
             stack: 11 * KIB,
             budget: [63 * KIB, 14 * KIB],
+            interrupts: ["USART1", "USART3", "EXTI3"],
         },
     },
     // The FX3U-14MR's clone: an STM32F103VC.
