@@ -133,6 +133,7 @@ const ROWS: [Row; 5] = [
             smaller: None,
             stack: 11 * KIB,
             budget: [68 * KIB, 20 * KIB],
+            interrupts: ["UART4", "USART1", "EXTI3"],
         },
     },
     // The FX3U-24MR's clone: an STM32F103VC.
@@ -161,6 +162,7 @@ const ROWS: [Row; 5] = [
             smaller: None,
             stack: 11 * KIB,
             budget: [68 * KIB, 20 * KIB],
+            interrupts: ["UART4", "USART1", "EXTI3"],
         },
     },
     // The "eth_modbus_io5r": an STM32F103CB.
@@ -183,6 +185,7 @@ const ROWS: [Row; 5] = [
             smaller: None,
             stack: 8 * KIB,
             budget: [53 * KIB, 11 * KIB + 256],
+            interrupts: ["USART2", "USART3", "EXTI2"],
         },
     },
 ];
