@@ -62,7 +62,7 @@ struct Row {
     memory: Memory,
 }
 
-const ROWS: [Row; 2] = [
+const ROWS: [Row; 3] = [
     // The LLD-ModbusIO-02 with an STM32F103CB, or a C8 on a "Blue Pill": one slot, port 5.
     Row {
         name: "modio-02",
@@ -93,6 +93,21 @@ const ROWS: [Row; 2] = [
             interrupts: ["USART1", "USART3", "EXTI3"],
         },
     },
+    // The "eth_modbus_io5r" with an STM32F103CB: fixed inputs and relays at ports 1 to 4.
+    Row {
+        name: "eth-io5r",
+        code: 5,
+        model: "eth_modbus_io5r",
+        first_port: 1,
+        slots: 4,
+        memory: Memory {
+            part: STM32F103CB,
+            smaller: None,
+            stack: 8 * KIB,
+            budget: [53 * KIB, 11 * KIB + 256],
+            interrupts: ["USART2", "USART3", "EXTI2"],
+        },
+    },
 ];
 
 impl Row {
@@ -113,10 +128,12 @@ impl Row {
 pub const MODIO_02: Board = ROWS[0].board();
 /// The modio-08.
 pub const MODIO_08: Board = ROWS[1].board();
+/// The eth-io5r.
+pub const ETH_IO5R: Board = ROWS[2].board();
 
 impl Board {
     /// All boards, in the order of their codes.
-    pub const ALL: [&'static Self; 2] = [&MODIO_02, &MODIO_08];
+    pub const ALL: [&'static Self; 3] = [&MODIO_02, &MODIO_08, &ETH_IO5R];
 
     /// Every code of register BOARD with the board's name.
     pub const NAMES: [(u16, &'static str); Self::ALL.len()] = {
@@ -249,7 +266,10 @@ mod tests {
         }
         assert_eq!(Board::from_code(0), None);
         let error = "nucleo".parse::<&Board>().unwrap_err();
-        assert_eq!(error.to_string(), "not a board; one of modio-02, modio-08");
+        assert_eq!(
+            error.to_string(),
+            "not a board; one of modio-02, modio-08, eth-io5r"
+        );
     }
 
     #[test]
