@@ -194,9 +194,17 @@ pub fn up(
     let (radio, radio_uart) = radio_config
         .and_then(|config| {
             let units = line::units(address.unit(), false)?;
-            let (uart, mode, aux) = board.radio.start(&mut board.rcc)?;
+            let (uart, mode, aux, proof) = board.radio.start(&mut board.rcc)?;
             let power_on = u16::from(board.reset_cause) & POWER_ON != 0;
-            let radio = Radio::new(Serial, mode, aux, config, units, power_on, radio_adus);
+            let radio = Radio::new(
+                Serial(proof),
+                mode,
+                aux,
+                config,
+                units,
+                power_on,
+                radio_adus,
+            );
             Some((radio, uart))
         })
         .unzip();
