@@ -18,7 +18,7 @@ use super::segment::Segments;
 use super::timing::InstructionClock;
 use super::waits::Waits;
 use crate::finding::{Findings, What, Width};
-use crate::memory::{FLASH_BASE, Memory};
+use crate::memory::FLASH_BASE;
 use crate::part::Part;
 use crate::periph::dbgmcu::Dbgmcu;
 use crate::periph::ident::Ident;
@@ -51,8 +51,6 @@ pub struct Bus<C> {
     pub(super) pc: u32,
     /// The measurement of interrupt waits, while it is on.
     pub(super) waits: Option<Box<Waits>>,
-    /// The SRAM.
-    pub(super) ram: Memory,
     /// The costs of the code.
     pub(super) segments: Segments,
     /// Reads of flash come here: all of them, or those of these pages of the core's.

@@ -13,7 +13,7 @@ use super::{Config, Layout, Radio};
 /// Driver enable of the RS-485 line.
 const DRIVER_ENABLE: Pin = Pin::new('A', 8);
 /// Transmitter of the RS-485 line.
-const TX: Pin = Pin::new('A', 9);
+pub(crate) const LINE_TX: Pin = Pin::new('A', 9);
 /// USART3's transmitter: RXD of the LoRa module.
 const RADIO_TX: Pin = Pin::new('B', 10);
 /// I2C bus of the modules' DACs.
@@ -127,7 +127,7 @@ impl Circuit for Modio {
 
     fn wire(&mut self, tx: Pin) -> Option<&mut dyn Wire> {
         match tx {
-            TX => Some(&mut self.line),
+            LINE_TX => Some(&mut self.line),
             RADIO_TX => self.radio.as_mut().map(|radio| radio as &mut dyn Wire),
             _ => None,
         }

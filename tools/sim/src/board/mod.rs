@@ -10,6 +10,7 @@ mod outside;
 mod radio;
 mod stored;
 
+pub(crate) use circuit::LINE_TX;
 pub use circuit::Modio;
 pub use config::Config;
 pub use firmware::{Firmware, InSlot};

@@ -2,7 +2,7 @@
 
 use register_map::Module;
 
-use super::{Board, Error, Layout};
+use super::{Board, Error, LINE_TX, Layout};
 use crate::line::Line;
 use crate::radio::{self, Air};
 use crate::slot::{BusFault, Channel, Slot};
@@ -171,7 +171,7 @@ impl Board {
     /// sends.
     #[must_use]
     pub fn line_bytes_written(&self) -> u64 {
-        self.usart1().data_writes()
+        self.usart(LINE_TX).data_writes()
     }
 
     /// Returns the RS-485 line, for sending and for reading the record.
