@@ -13,6 +13,9 @@ pub enum Error {
     /// The board has no slot at this port.
     #[error("the board has no slot at port {0}")]
     Slot(u8),
+    /// The board has no terminal with this name, or the terminal is of another kind.
+    #[error("the board has no such input with this name")]
+    Terminal,
     /// The board has no LoRa module.
     #[error("the board has no LoRa module")]
     NoRadio,

@@ -40,6 +40,7 @@ impl<C: Circuit> Chip<C> {
     pub fn sync(&mut self) {
         let now = self.now();
         self.bus.soc.sync(now);
+        self.bus.take_notes();
     }
 
     /// Runs as [`Chip::run_until`], but neither takes over changes of the circuit before nor computes what is computed

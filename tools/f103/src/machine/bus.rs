@@ -87,9 +87,7 @@ impl<C: Circuit> Bus<C> {
             }
         }
         if self.soc.has_notes() {
-            for (at, what) in self.soc.take_notes() {
-                self.findings.add(at, self.pc, what);
-            }
+            self.take_notes();
         }
         if core::mem::take(&mut self.soc.signals.rate) {
             self.update_rate(count);
@@ -104,6 +102,13 @@ impl<C: Circuit> Bus<C> {
         // The machine makes the reset, and waits out the flash.
         let busy = self.soc.flash.busy_until().is_some();
         self.halt |= self.soc.signals.reset.is_some() || busy != self.busy;
+    }
+
+    /// Takes up the findings of the blocks and of the circuit.
+    pub fn take_notes(&mut self) {
+        for (at, what) in self.soc.take_notes() {
+            self.findings.add(at, self.pc, what);
+        }
     }
 
     /// The instruction rate follows HCLK and the flash's wait states.

@@ -20,6 +20,7 @@ pub const GPIOC: u32 = 0x4001_1000;
 pub const TIM2: u32 = 0x4000_0000;
 pub const USART1: u32 = 0x4001_3800;
 pub const USART3: u32 = 0x4000_4800;
+pub const GPIOD: u32 = 0x4001_1400;
 pub const GPIOE: u32 = 0x4001_1800;
 pub const UART4: u32 = 0x4000_4C00;
 pub const DAC: u32 = 0x4000_7400;

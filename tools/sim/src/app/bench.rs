@@ -132,7 +132,7 @@ impl Bench {
     /// The reason why the board refuses the action. Nothing has changed then.
     pub fn apply(&mut self, n: usize, action: &Action) -> Result<(), Error> {
         let board = self.bus.board_mut(n);
-        let first = board.layout().slots[0].port;
+        let first = board.first_port();
         match *action {
             Action::Channel {
                 port,

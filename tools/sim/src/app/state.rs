@@ -241,7 +241,10 @@ pub fn of_board(bench: &mut Bench, n: usize) -> State {
             FlashSlot::B => "B",
         }),
         module: board.module().into(),
-        configured: configured(board, board.layout().slots[0].port),
+        configured: match board.layout().slots.first() {
+            Some(slot) => configured(board, slot.port),
+            None => Module::None.into(),
+        },
         leds: Leds {
             activity: leds.activity,
             fault: leds.fault,
@@ -254,7 +257,7 @@ pub fn of_board(bench: &mut Bench, n: usize) -> State {
             rx_frames,
             tx_frames,
         },
-        channels: channels(board.slot()),
+        channels: [1, 2, 3, 4].map(|number| board.channel(number).into()),
         log_tail: bench.units[n].log_tail().map(str::to_owned).collect(),
         slots,
         radio: board.radio().map(radio),

@@ -1,6 +1,6 @@
 //! How far the boards of a bus can run before they exchange their characters and packets.
 
-use crate::board::{Board, LINE_TX};
+use crate::board::Board;
 use crate::radio::timing;
 use f103::time::Time;
 
@@ -72,7 +72,7 @@ impl Board {
     /// Returns the next actions of the board.
     pub(super) fn plan(&self) -> Plan {
         let awake = self.next_instruction();
-        let usart = self.usart(LINE_TX);
+        let usart = self.usart(self.layout().line.tx);
         let start = match usart.earliest_start(awake) {
             _ if awake == Time::MAX => awake,
             Some(start) => start,
