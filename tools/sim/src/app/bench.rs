@@ -143,6 +143,7 @@ impl Bench {
                 Change::Manual(on) => slot.set_manual(channel, on),
                 Change::Millivolts(millivolts) => slot.set_millivolts(channel, millivolts),
             })??,
+            Action::Terminal { ref name, applied } => board.set_terminal(name, applied.into())?,
             Action::Dip(dip) => board.set_dip(dip),
             Action::PowerOn => board.power_on(),
             Action::PowerOff => board.power_off(),

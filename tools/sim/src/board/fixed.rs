@@ -182,7 +182,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_terminal_has_a_name_and_a_pin_of_its_own() {
+    fn no_two_terminals_have_the_same_name_or_pin() {
         for layout in [&FX3U_14, &FX3U_24, &ETH_IO5R] {
             let all = layout.terminals;
             for (n, one) in all.iter().enumerate() {

@@ -125,8 +125,8 @@ impl Terminals {
     ///
     /// # Errors
     ///
-    /// [`Error::Terminal`] if the board has no such terminal, or if it is of another kind or an output;
-    /// [`Error::Range`] if the value is out of its range.
+    /// [`Error::Terminal`] if the board has no such terminal, [`Error::TerminalKind`] if it is of another kind or an
+    /// output, [`Error::Range`] if the value is out of its range.
     pub fn set(&mut self, name: &str, value: Value) -> Result<(), Error> {
         match value {
             Value::Voltage(12_001..) => return Err(Error::Range("the input takes 0 to 12000 mV")),
@@ -134,13 +134,13 @@ impl Terminals {
             Value::Potentiometer(1_001..) => {
                 return Err(Error::Range("a potentiometer takes 0 to 1000"));
             }
-            Value::Relay(_) | Value::Output(_) => return Err(Error::Terminal),
+            Value::Relay(_) | Value::Output(_) => return Err(Error::TerminalKind),
             _ => {}
         }
         let at = self.table.iter().position(|known| known.name == name);
         let place = at.map(|at| &mut self.values[at]).ok_or(Error::Terminal)?;
         if core::mem::discriminant(place) != core::mem::discriminant(&value) {
-            return Err(Error::Terminal);
+            return Err(Error::TerminalKind);
         }
         *place = value;
         Ok(())
@@ -258,12 +258,12 @@ mod tests {
     #[test]
     fn value_of_the_wrong_kind_or_out_of_range_is_refused() {
         let mut terminals = Terminals::new(&TABLE);
-        for (name, value) in [
-            ("X0", Value::Voltage(1)),
-            ("Y0", Value::Relay(true)),
-            ("X7", Value::Input(true)),
+        for (name, value, error) in [
+            ("X0", Value::Voltage(1), Error::TerminalKind),
+            ("Y0", Value::Relay(true), Error::TerminalKind),
+            ("X7", Value::Input(true), Error::Terminal),
         ] {
-            assert_eq!(terminals.set(name, value), Err(Error::Terminal), "{name}");
+            assert_eq!(terminals.set(name, value), Err(error), "{name}");
         }
         let most = terminals.set("AD0", Value::Voltage(12_001));
         assert!(matches!(most, Err(Error::Range(_))));
