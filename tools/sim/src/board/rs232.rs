@@ -4,14 +4,14 @@ use f103::periph::usart::{Sent, TxPin, Wire};
 use f103::serial::Settings;
 use f103::time::Time;
 
-use crate::uart::Uart;
+use crate::uart::{Byte, Uart};
 
 /// The port and its terminal.
 #[derive(Clone, Debug)]
 pub struct Rs232 {
     uart: Uart,
     settings: Settings,
-    received: Vec<u8>,
+    received: Vec<Byte>,
     now: Time,
 }
 
@@ -41,15 +41,18 @@ impl Rs232 {
         self.settings
     }
 
-    /// Sends bytes to the board, without a gap, after those that are still to be sent.
-    pub fn send(&mut self, bytes: &[u8]) {
+    /// Sends bytes to the board from `at` on, without a gap, or after those that are still to be sent. Returns the end of
+    /// the last stop bit.
+    pub fn send(&mut self, at: Time, bytes: &[u8]) -> Time {
         // The edges up to the present have been passed on.
-        let at = self.now + Time::from_ps(1);
+        let at = at.max(self.now + Time::from_ps(1));
         self.uart.send(at, bytes.iter().copied());
+        self.uart.sent_until()
     }
 
-    /// Returns the bytes that the board has sent since the last call. A damaged character counts, as on a terminal.
-    pub fn take_received(&mut self) -> Vec<u8> {
+    /// Returns the bytes that the board has sent since the last call, with their times. A damaged character counts, as on
+    /// a terminal.
+    pub fn take_received(&mut self) -> Vec<Byte> {
         core::mem::take(&mut self.received)
     }
 }
@@ -66,7 +69,11 @@ impl Wire for Rs232 {
     fn advance(&mut self, to: Time) {
         self.now = to;
         while let Some(word) = self.uart.next_word(to) {
-            self.received.push(word.data as u8);
+            self.received.push(Byte {
+                byte: word.data as u8,
+                start: word.start,
+                end: word.end,
+            });
         }
         self.uart.take_sent(to);
         self.uart.forget(to);

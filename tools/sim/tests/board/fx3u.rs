@@ -103,8 +103,9 @@ fn byte_is_sent_back_at_uart4_and_at_the_rs232_port() {
     board.line().send(Time::from_ms(20), b"A");
     let port = board.rs232().unwrap();
     port.set_settings(LINE);
-    board.run_until(Time::from_ms(22));
-    board.rs232().unwrap().send(b"B");
+    let end = port.send(Time::from_ms(22), b"B");
+    // A start bit, eight data bits and a stop bit.
+    assert_eq!(end, Time::from_ms(22) + LINE.rate().bits(10));
     board.run_until(Time::from_ms(30));
     assert_eq!((out(&board, 0), out(&board, 1)), (0x41, 0x42));
     let frame = board.line().frames().next().unwrap();

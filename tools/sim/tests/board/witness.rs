@@ -67,6 +67,12 @@ fn inputs(board: &mut Board) -> u16 {
     u16::from_be_bytes([reply[2], reply[3]])
 }
 
+/// Returns the text that the witness has sent to the RS-232 port.
+fn console(board: &mut Board) -> String {
+    let received = board.rs232().unwrap().take_received();
+    received.iter().map(|byte| char::from(byte.byte)).collect()
+}
+
 fn relays(board: &Board) -> Vec<&'static str> {
     let all = board.terminals().iter();
     let on = all.filter(|(_, value)| *value == Value::Relay(true));
@@ -78,8 +84,7 @@ fn relays(board: &Board) -> Vec<&'static str> {
 fn witness_reads_every_input_and_switches_every_relay_by_its_own_table() {
     let mut board = witness();
     board.run_until(Time::from_ms(1000));
-    let console = board.rs232().unwrap().take_received();
-    assert_eq!(console, b"START\nPORRSTF=1\nPINRSTF=1\n");
+    assert_eq!(console(&mut board), "START\nPORRSTF=1\nPINRSTF=1\n");
     assert_eq!(inputs(&mut board), 0xFCFF);
     let names = (0..8).chain(10..16).map(|n| (n, format!("X{n}")));
     for (n, name) in names {
@@ -153,8 +158,7 @@ fn witness_measures_the_analog_terminals_and_switches_the_led() {
     let at = board.now();
     board.line().send(at, &[&frame[..], &crc].concat());
     board.run_for(Time::from_ms(1000));
-    let console = board.rs232().unwrap().take_received();
-    let console = String::from_utf8_lossy(&console);
+    let console = console(&mut board);
     assert!(
         console.ends_with("START\nSFTRSTF=1\nPINRSTF=1\n"),
         "{console}"

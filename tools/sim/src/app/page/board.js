@@ -45,6 +45,8 @@ export function show(state) {
   for (const name of ["run", "fault", "activity"]) {
     byId(`led-${name}`).classList.toggle("lit", state.leds[name]);
     setText(byId(`led-${name}-text`), state.leds[name] ? "on" : "off");
+    // A board with fixed inputs and outputs has one LED.
+    byId(`led-${name}`).parentElement.hidden = name !== "run" && Boolean(state.terminals);
   }
   setText(byId("line-rate"), `${state.line.baud} bit/s`);
   setText(byId("line-format"), state.line.format);
