@@ -1,5 +1,6 @@
-//! Gives the linker of an image the memory of the board. The features of this package select the board, and what is
-//! linked: the loader, the application for a slot behind it, or the application alone.
+//! Gives the linker of an image the memory of the board, and the application the interrupts that depend on the board. The
+//! features of this package select the board, and what is linked: the loader, the application for a slot behind it, or the
+//! application alone.
 
 use std::{env, fs, path::PathBuf};
 
@@ -17,6 +18,8 @@ const KEPT: u32 = 512;
 const LOADER_VARIABLES: u32 = 2048;
 /// Bytes of a vector.
 const VECTOR: u32 = 4;
+/// Handlers of the application whose interrupts depend on the board.
+const HANDLERS: [&str; 3] = ["LINE", "RADIO", "SERVE"];
 
 fn main() {
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
@@ -26,7 +29,21 @@ fn main() {
         return;
     }
     if let Some(board) = Board::ALL.into_iter().find(|board| is_on(board.name)) {
-        fs::write(out.join("memory.x"), memory(board)).expect("OUT_DIR is writable");
+        let handlers = || HANDLERS.into_iter().zip(board.memory().interrupts);
+        let mut script = memory(board);
+        if !is_on("loader") {
+            script.extend(handlers().map(|(handler, name)| format!("{name} = {handler};\n")));
+        }
+        let interrupts: String = handlers()
+            .map(|(handler, name)| {
+                format!(
+                    "/// The interrupt of this handler.\n\
+                     pub const {handler}: Interrupt = Interrupt::{name};\n"
+                )
+            })
+            .collect();
+        fs::write(out.join("memory.x"), script).expect("OUT_DIR is writable");
+        fs::write(out.join("interrupts.rs"), interrupts).expect("OUT_DIR is writable");
     }
     println!("cargo::rustc-link-search={}", out.display());
 }

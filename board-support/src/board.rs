@@ -1,20 +1,20 @@
 //! The board as one struct of named devices.
 
+use core::array;
+
 use cortex_m::peripheral::SCB;
-use stm32f1xx_hal::{
-    pac,
-    rcc::{Enable, Reset},
-};
+use stm32f1xx_hal::{pac, rcc::Enable};
 
 use crate::{
     ClockSource, CrcUnit, DacBus, Flash, IoPin, Rs485, Rs485Timer, SLOT, Sampler, ScanTimer,
     Watchdog,
-    boards::BOARD,
+    boards::{AddressPins, BOARD, LEDS},
     clock,
     design::{CRYSTAL_FAULTS, DIP_POLL_US, DIP_SETTLE_CYCLES},
-    dip,
+    dip, early,
     fault::FaultRecord,
     gap::LineTimes,
+    gesture::Watch,
     kept,
     pin::Pin,
     radio::RadioOff,
@@ -36,7 +36,8 @@ pub struct Board {
     pub reset_cause: u8,
     /// The last fault before this start.
     pub faults: FaultRecord,
-    /// SW01 as a number from 0 to 255, as read at power-on.
+    /// SW01 as a number from 0 to 255, as read at power-on. On a board without SW01 it is 0, or 255 after the gesture that
+    /// starts recovery.
     pub dip: u8,
     /// This start is one as with SW01 = 255, COMMAND 0xB007.
     pub as_255: bool,
@@ -58,8 +59,11 @@ pub struct Board {
     pub flash: Flash,
     /// The unit that computes the CRC-32 of an image.
     pub crc: CrcUnit,
-    /// The LEDs for activity and fault, which high lights, and for running, which low lights. All are off.
-    pub leds: [IoPin; 3],
+    /// The LEDs for activity and fault, which high lights, and for running, which low lights; or only the last one. All are
+    /// off.
+    pub leds: [IoPin; LEDS],
+    /// The switch or button whose gesture starts recovery.
+    pub recovery: RecoveryPins,
     /// The timer that starts each scan, not started yet.
     pub scan_timer: ScanTimer,
     /// The watchdog, running with the long period for the start-up.
@@ -72,9 +76,31 @@ pub struct Board {
     pub rcc: pac::RCC,
 }
 
+/// Number of gestures that start recovery: one, or none on a board with SW01.
+const GESTURES: usize = matches!(BOARD.address, AddressPins::Register(_)) as usize;
+
+/// The switch or button whose gesture after a power-on starts recovery. A board with SW01 has none.
+pub struct RecoveryPins([Option<Watch>; GESTURES]);
+
+impl RecoveryPins {
+    fn new(after_power_on: bool) -> Self {
+        Self(array::from_fn(|_| match BOARD.address {
+            AddressPins::Register(gesture) if after_power_on => Some(Watch::new(gesture)),
+            _ => None,
+        }))
+    }
+
+    /// Returns whether the gesture has just ended, at `now` milliseconds after the start. Call this every 10 ms or so.
+    pub fn is_asked(&mut self, now: u32) -> bool {
+        let watches = self.0.iter_mut().flatten();
+        watches.fold(false, |asked, watch| {
+            asked | watch.step(now, watch.pin().is_high())
+        })
+    }
+}
+
 /// The RS-485 line before it is set up.
 pub struct LineOff {
-    usart: pac::USART1,
     timer: pac::TIM2,
     start_bit: pac::TIM1,
     clock: ClockSource,
@@ -93,7 +119,7 @@ impl LineOff {
         let clock = self.clock;
         let (timer, start_bit) = (self.timer, self.start_bit);
         let gap = Rs485Timer::new(timer, start_bit, settings, times, clock, rcc)?;
-        let line = Rs485::new(self.usart, settings, clock, rcc)?;
+        let line = Rs485::new(settings, clock, rcc)?;
         Some((line, gap))
     }
 }
@@ -127,18 +153,23 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
     let dip = dip.unwrap_or_else(|| switch(clock.core_mhz()));
 
     // PC13 must not be faster than 2 MHz nor drive more than 3 mA (DS5319 table 5, notes).
-    let leds = [
-        IoPin::low(Pin::b(8)),
-        IoPin::low(Pin::b(9)),
-        IoPin::high(Pin::c(13)),
-    ];
+    let leds = array::from_fn(|led| {
+        let off = if led + 1 == LEDS {
+            IoPin::high
+        } else {
+            IoPin::low
+        };
+        off(BOARD.leds[led])
+    });
 
     // Allow a debug probe to read the log while the core sleeps.
     device.DBGMCU.cr().modify(|_, w| w.dbg_sleep().set_bit());
-    // TIM1 is connected to PA10 through the alternate-function block, in its reset mapping.
-    pac::AFIO::enable(&mut rcc);
+    // It connects TIM1 to PA10 in its reset mapping, and ports to external interrupts.
+    early::write_mapr(&mut rcc, &device.AFIO);
     pac::ADC1::enable(&mut rcc);
-    pac::I2C1::enable(&mut rcc);
+    if BOARD.has_dacs() {
+        pac::I2C1::enable(&mut rcc);
+    }
     pac::PWR::enable(&mut rcc);
 
     Board {
@@ -157,10 +188,10 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
         flash: Flash::new(device.FLASH, device.PWR, masked),
         crc: CrcUnit::new(device.CRC, &mut rcc),
         leds,
+        recovery: RecoveryPins::new(reset_cause & POWER_ON != 0),
         scan_timer: ScanTimer::new(device.TIM4, clock, &mut rcc),
         watchdog,
         line: LineOff {
-            usart: device.USART1,
             timer: device.TIM2,
             start_bit: device.TIM1,
             clock,
@@ -173,23 +204,28 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
     }
 }
 
-/// Turns the clocks of the ports on. Every pin floats, as after a reset of the chip, but those of SW01 are pulled up.
+/// Turns the clocks of the ports on. Every pin floats, as after a reset of the chip, but those of SW01 are pulled up, and
+/// those that the board holds stay as they are.
 pub(crate) fn set_up_ports(rcc: &mut pac::RCC) {
-    pac::GPIOA::enable(rcc);
-    pac::GPIOB::enable(rcc);
-    pac::GPIOC::enable(rcc);
-    pac::GPIOA::reset(rcc);
-    pac::GPIOB::reset(rcc);
-    pac::GPIOC::reset(rcc);
-    // One side of each switch is connected to ground.
-    BOARD.switch.iter().for_each(|pin| pin.pull_up());
+    early::ports_on(rcc);
+    early::float_pins(rcc);
+    match BOARD.address {
+        // One side of each switch is connected to ground.
+        AddressPins::Switch(pins) => pins.iter().for_each(|pin| pin.pull_up()),
+        AddressPins::Register(gesture) => gesture.pin().pull_up(),
+    }
 }
 
-/// Reads SW01 and keeps it, with a core clock of `mhz` MHz. The ports must be set up.
+/// Reads SW01 and keeps it, with a core clock of `mhz` MHz. The ports must be set up. Without SW01 this is 0.
 pub(crate) fn switch(mhz: u8) -> u8 {
-    cortex_m::asm::delay(DIP_SETTLE_CYCLES);
-    let read = || dip::number(&BOARD.switch, Pin::is_high);
-    let dip = dip::stable(read, || wait::wait_us(DIP_POLL_US, mhz));
+    let dip = match BOARD.address {
+        AddressPins::Switch(pins) => {
+            cortex_m::asm::delay(DIP_SETTLE_CYCLES);
+            let read = || dip::number(&pins, Pin::is_high);
+            dip::stable(read, || wait::wait_us(DIP_POLL_US, mhz))
+        }
+        AddressPins::Register(_) => 0,
+    };
     kept::keep_dip(dip);
     dip
 }

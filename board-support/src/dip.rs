@@ -39,7 +39,7 @@ mod tests {
     use std::vec::Vec;
 
     use super::*;
-    use crate::boards::{modio_02, modio_08};
+    use crate::boards::{AddressPins, modio_02, modio_08};
 
     /// Feeds these readings to `stable`, repeating the last one, and returns the value and the number of readings
     /// taken.
@@ -81,14 +81,17 @@ mod tests {
     #[test]
     fn every_position_has_its_own_bit() {
         let on = |switch: &[Pin; 8], low: &[Pin]| number(switch, |pin| !low.contains(&pin));
-        for (switch, lower, upper) in [
+        for (address, lower, upper) in [
             (
-                &modio_02::BOARD.switch,
+                modio_02::BOARD.address,
                 Pin::a as fn(u8) -> Pin,
                 (Pin::b as fn(u8) -> Pin),
             ),
-            (&modio_08::BOARD.switch, |n| Pin::c(n + 2), Pin::b),
+            (modio_08::BOARD.address, |n| Pin::c(n + 2), Pin::b),
         ] {
+            let AddressPins::Switch(switch) = &address else {
+                panic!("the board has SW01");
+            };
             assert_eq!((on(switch, &[]), on(switch, switch)), (0, 255));
             for position in 0..4 {
                 assert_eq!(on(switch, &[lower(4 + position)]), 1 << position);

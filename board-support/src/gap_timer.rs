@@ -2,9 +2,9 @@
 //! may already have begun.
 //!
 //! The UART raises its flag only when a character is complete. A character that began just before t3.5 belongs to
-//! the frame, but its flag is not set yet when t3.5 is reached. Its start bit is already on the line: PA10 is both
-//! the input of USART1 and that of TIM1's channel 3. The capture flag shows, without an interrupt, that the line
-//! has fallen since the flag was cleared.
+//! the frame, but its flag is not set yet when t3.5 is reached. Its start bit is already on the line. PA10 is both
+//! the input of USART1 and that of TIM1's channel 3: the capture flag shows, without an interrupt, that the line
+//! has fallen since the flag was cleared. The pin of another UART is that of an external interrupt ([`edge`](crate::edge)).
 //!
 //! The line also falls when a noise pulse is too short for a start bit (RM0008 27.3.3). An edge therefore delays
 //! the decision only once, by one character time. A real character is complete by then and restarts the silence.
@@ -21,11 +21,27 @@ use stm32f1xx_hal::{
 
 use crate::{
     ClockSource,
+    boards::BOARD,
     design::LONGEST_WAIT_US,
+    edge::Edge,
     gap::{CharacterBits, GapTicks, LimitTicks, LineTimes},
     line::{Alarms, GapTimer, Silence},
     uart::LineSettings,
 };
+
+/// The external interrupt for the edges of the line, if TIM1 does not capture them.
+const EDGE: Option<Edge> = match BOARD.line.edge() {
+    Some(pin) => Some(Edge(pin)),
+    None => None,
+};
+
+/// Handles the interrupt of an edge.
+#[unsafe(link_section = ".ram_code")]
+extern "C" fn on_edge() {
+    if let Some(edge) = EDGE {
+        edge.take();
+    }
+}
 
 /// The timers of the line.
 pub struct Rs485Timer {
@@ -73,6 +89,9 @@ impl Rs485Timer {
             us,
         };
         gap.set_up();
+        if let Some(edge) = EDGE {
+            edge.start(on_edge);
+        }
         Some(gap)
     }
 
@@ -83,8 +102,29 @@ impl Rs485Timer {
     }
 
     /// Returns the time of the last falling edge.
+    #[inline(always)]
     fn last_edge(&self) -> u32 {
-        u32::from(self.start_bit.ccr3().read().ccr().bits()) << 16
+        let count = EDGE.map_or_else(|| self.start_bit.ccr3().read().ccr().bits(), Edge::count);
+        u32::from(count) << 16
+    }
+
+    /// Returns whether the line has fallen since the last call of [`Self::forget_edge`].
+    #[inline(always)]
+    fn has_fallen(&self) -> bool {
+        EDGE.map_or_else(
+            || self.start_bit.sr().read().cc3if().bit_is_set(),
+            Edge::fell,
+        )
+    }
+
+    #[inline(always)]
+    fn forget_edge(&self) {
+        match EDGE {
+            Some(edge) => edge.clear(),
+            None => {
+                self.start_bit.sr().write(|w| w.cc3if().clear_bit());
+            }
+        }
     }
 
     fn halt(&mut self) {
@@ -128,11 +168,16 @@ impl GapTimer for Rs485Timer {
         start_bit.ccmr1_output().reset();
         // The channel must be off while its input is selected (RM0008 14.4.7).
         start_bit.ccer().reset();
-        start_bit.ccmr2_input().write(|w| w.cc3s().ti3());
-        // Capture on the falling edge.
-        start_bit
-            .ccer()
-            .write(|w| w.cc3e().set_bit().cc3p().set_bit());
+        if let Some(edge) = EDGE {
+            start_bit.ccmr2_output().reset();
+            edge.set_up();
+        } else {
+            start_bit.ccmr2_input().write(|w| w.cc3s().ti3());
+            // Capture on the falling edge.
+            start_bit
+                .ccer()
+                .write(|w| w.cc3e().set_bit().cc3p().set_bit());
+        }
         start_bit.psc().write(|w| w.psc().set(self.limit.prescaler));
         start_bit.arr().write(|w| w.arr().set(0xFFFF));
         // Load the prescaler.
@@ -182,9 +227,12 @@ impl GapTimer for Rs485Timer {
     }
 
     fn fell(&mut self) -> Option<u32> {
-        let fell = self.start_bit.sr().read().cc3if().bit_is_set();
-        // Reading the captured count clears the flag (RM0008 14.4.5).
-        fell.then(|| self.last_edge())
+        let fell = self.has_fallen().then(|| self.last_edge());
+        // Reading the captured count has cleared its flag (RM0008 14.4.5).
+        if let Some(edge) = EDGE {
+            edge.clear();
+        }
+        fell
     }
 
     /// The interrupt of a character may be late. So its end is calculated from its last falling edge, unless that was
@@ -221,8 +269,8 @@ impl GapTimer for Rs485Timer {
 
     #[inline]
     fn restart(&mut self) {
-        // Clear the capture flag, so that it shows edges after this character only.
-        self.start_bit.sr().write(|w| w.cc3if().clear_bit());
+        // Only edges after this character count.
+        self.forget_edge();
         // The update event clears the counter and the prescaler. With URS set it raises no interrupt.
         self.timer
             .cr1()
@@ -245,7 +293,7 @@ impl GapTimer for Rs485Timer {
         // Clear only the flags that were read; a flag set after that raises the interrupt again.
         // SAFETY: writing 0 clears a bit of SR and writing 1 leaves it unchanged (RM0008 15.4.5).
         self.timer.sr().write(|w| unsafe { w.bits(!flags.bits()) });
-        let may_be_on_its_way = self.start_bit.sr().read().cc3if().bit_is_set();
+        let may_be_on_its_way = self.has_fallen();
         if flags.uif().bit_is_set() {
             // The counter has stopped, because of one-pulse mode.
             Silence::T35

@@ -11,6 +11,7 @@ pub mod boards;
 pub mod design;
 pub mod fault;
 pub mod gap;
+pub mod gesture;
 #[cfg(any(target_os = "none", test))]
 mod i2c;
 pub mod kept;
@@ -18,6 +19,7 @@ pub mod line;
 pub mod pages;
 mod pin;
 pub mod uart;
+mod usart;
 
 #[cfg(target_os = "none")]
 mod adc;
@@ -27,8 +29,14 @@ pub mod board;
 mod clock;
 #[cfg(target_os = "none")]
 mod crc_unit;
+#[cfg(target_os = "none")]
+pub mod device;
 #[cfg(any(target_os = "none", test))]
 mod dip;
+#[cfg(target_os = "none")]
+mod early;
+#[cfg(target_os = "none")]
+mod edge;
 #[cfg(target_os = "none")]
 pub mod flash;
 #[cfg(target_os = "none")]
@@ -65,6 +73,7 @@ mod watchdog;
 #[cfg(target_os = "none")]
 pub use {
     adc::Sampler,
+    board::RecoveryPins,
     clock::ClockSource,
     crc_unit::CrcUnit,
     flash::{Flash, FlashError},

@@ -9,12 +9,14 @@ use stm32f1xx_hal::{
 use crate::{
     Flash, IoPin, Watchdog,
     board::{set_up_ports, switch, take_reset_cause},
+    boards::BOARD,
     clock,
     crc_unit::CrcUnit,
     design::LOADER_MHZ,
+    early,
     flash::{self, BootPages, slot_address},
     kept,
-    pin::{Mode, Pin},
+    pin::Mode,
     wait::wait_us,
 };
 
@@ -100,9 +102,7 @@ impl Loading {
     /// There must be a whole application, linked for this address.
     pub unsafe fn run(mut self, slot: usize, offset: u32, chosen: bool, scb: &SCB) -> ! {
         kept::keep_chosen(if chosen { slot as u8 + 1 } else { 0 });
-        pac::GPIOA::reset(&mut self.rcc);
-        pac::GPIOB::reset(&mut self.rcc);
-        pac::GPIOC::reset(&mut self.rcc);
+        early::float_pins(&mut self.rcc);
         pac::PWR::reset(&mut self.rcc);
         clock::as_after_reset(&self.rcc, self.flash.controller());
         self.rcc.ahbenr().reset();
@@ -118,12 +118,17 @@ impl Loading {
         }
     }
 
-    /// Shows that no image can be started: the fault LED is lit, and the running LED blinks five times a second.
+    /// Shows that no image can be started: the fault LED, if there is one, is lit, and the running LED blinks five times a
+    /// second.
     pub fn show_nothing(mut self) -> ! {
         clock::as_after_reset(&self.rcc, self.flash.controller());
         set_up_ports(&mut self.rcc);
-        let _fault = IoPin::high(Pin::b(9));
-        let running = Pin::c(13);
+        let [others @ .., running] = BOARD.leds else {
+            unreachable!("every board has an LED")
+        };
+        if let [_, fault] = *others {
+            IoPin::high(fault);
+        }
         running.configure(Mode::Output);
         loop {
             for high in [true, false] {

@@ -1,8 +1,8 @@
 //! Small versions of the functions that the compiler calls to copy and fill memory.
 //!
 //! Those of `compiler_builtins` are unrolled for speed and take 1.4 KB of flash, but the image copies only a few
-//! hundred bytes at start and a few per request. The versions here work by words when both addresses are
-//! word-aligned, and otherwise by bytes. They are in assembly because a compiler replaces such a loop by a call of
+//! hundred bytes at start and a few per request. The versions here work by words (a copy by two) when both addresses
+//! are word-aligned, and otherwise by bytes. They are in assembly because a compiler replaces such a loop by a call of
 //! `memcpy`. The linker prefers them, because the symbols of `compiler_builtins` are weak.
 //!
 //! Names and arguments follow the C standard (`memcpy`, `memmove`, `memset`) and the Run-time ABI for the Arm
@@ -33,12 +33,14 @@ global_asm!(
     "  lsls r3, r3, #30",
     "  bne 2f",
     "1:",
-    "  subs r2, #4",
-    "  ittt hs",
+    "  subs r2, #8",
+    "  itttt hs",
+    "  ldrhs r3, [r1], #4",
+    "  strhs r3, [r12], #4",
     "  ldrhs r3, [r1], #4",
     "  strhs r3, [r12], #4",
     "  bhs 1b",
-    "  adds r2, #4",
+    "  adds r2, #8",
     "2:",
     "  subs r2, #1",
     "  ittt hs",

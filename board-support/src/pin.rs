@@ -9,7 +9,7 @@
 //! |---|---|
 //! | all, for slots, SW01, LEDs, the line and the radio | `board::setup`, `SlotPins`, `LineOff` and `RadioOff`: in `init`, before the first interrupt |
 //! | port B CRL, for the DACs' bus | `BusPins`: in `init` and later by the background task alone |
-//! | port A CRH, for the line | `Rs485::set_up` later, too, at the highest priority in use |
+//! | those of the line's pins | `Rs485::set_up` later, too, at the highest priority in use |
 //! | all of them | `Registers`, which repairs them, at the highest priority in use |
 //! | the slots' | `outputs_off`, from fault handlers, after which the interrupted program does not run again |
 //!
@@ -25,6 +25,18 @@ pub enum Port {
     B = 1,
     /// GPIOC.
     C = 2,
+    /// GPIOD.
+    D = 3,
+    /// GPIOE.
+    E = 4,
+}
+
+impl Port {
+    /// Returns the base address of the port's registers (RM0008 table 3).
+    #[must_use]
+    pub const fn base(self) -> u32 {
+        0x4001_0800 + 0x400 * self as u32
+    }
 }
 
 /// A pin of a GPIO port.
@@ -36,6 +48,18 @@ pub struct Pin {
 }
 
 impl Pin {
+    /// No pin: a channel that a port lacks.
+    pub const NONE: Self = Self {
+        port: Port::A,
+        number: 16,
+    };
+
+    /// Returns whether this is no pin.
+    #[must_use]
+    pub const fn is_none(self) -> bool {
+        self.number == Self::NONE.number
+    }
+
     /// Returns a pin of port A.
     #[must_use]
     pub const fn a(number: u8) -> Self {
@@ -54,19 +78,70 @@ impl Pin {
         Self::new(Port::C, number)
     }
 
+    /// Returns a pin of port D.
+    #[must_use]
+    pub const fn d(number: u8) -> Self {
+        Self::new(Port::D, number)
+    }
+
+    /// Returns a pin of port E.
+    #[must_use]
+    pub const fn e(number: u8) -> Self {
+        Self::new(Port::E, number)
+    }
+
     const fn new(port: Port, number: u8) -> Self {
         assert!(number < 16, "a port has pins 0 to 15");
         Self { port, number }
     }
 
+    /// Returns the port of the pin.
+    #[must_use]
+    pub const fn port(self) -> Port {
+        self.port
+    }
+
+    /// Returns the number of the pin in its port.
+    #[must_use]
+    pub const fn number(self) -> u8 {
+        self.number
+    }
+
+    /// Returns the number of the interrupt that the edges of the pin can raise (RM0008 table 63).
+    #[must_use]
+    pub const fn edge_interrupt(self) -> u16 {
+        match self.number {
+            0..=4 => 6 + self.number as u16,
+            5..=9 => 23,
+            _ => 40,
+        }
+    }
+
+    /// Returns the address of the configuration register of the pin, CRL or CRH (RM0008 9.2.1 and 9.2.2).
+    #[must_use]
+    pub const fn mode_register(self) -> u32 {
+        self.port.base() + self.number as u32 / 8 * 4
+    }
+
+    /// Returns the bits of the pin in its configuration register.
+    #[must_use]
+    pub const fn mode_bits(self) -> u32 {
+        0xF << (self.number % 8 * 4)
+    }
+
     /// Returns the number of the ADC1 input on this pin, if there is one (DS5319 table 5, DS5792 table 5).
     #[must_use]
     pub const fn adc_input(self) -> Option<u8> {
-        match (self.port, self.number) {
-            (Port::A, 0..=7) => Some(self.number),
-            (Port::B, 0..=1) => Some(8 + self.number),
-            (Port::C, 0..=5) => Some(10 + self.number),
-            _ => None,
+        // A match would become a table, which is longer.
+        let Self { port, number } = self;
+        if matches!(port, Port::A) && number < 8 {
+            Some(number)
+        } else if matches!(port, Port::B) && number < 2 {
+            Some(8 + number)
+        } else if matches!(port, Port::C) && number < 6 {
+            Some(10 + number)
+        } else {
+            None
         }
     }
 }
@@ -128,6 +203,24 @@ mod registers {
                 let bits = with(registers.crh().read().bits());
                 // SAFETY: as above.
                 registers.crh().write(|w| unsafe { w.bits(bits) });
+            }
+        }
+
+        /// Replaces the bits of `mask` in the configuration register of the pin.
+        #[inline(always)]
+        pub(crate) fn change_modes(self, mask: u32, bits: u32) {
+            let registers = self.port.registers();
+            // SAFETY: the callers give valid modes, and the other bits are kept.
+            unsafe {
+                if self.number < 8 {
+                    registers
+                        .crl()
+                        .modify(|r, w| w.bits(r.bits() & !mask | bits));
+                } else {
+                    registers
+                        .crh()
+                        .modify(|r, w| w.bits(r.bits() & !mask | bits));
+                }
             }
         }
 

@@ -4,17 +4,26 @@ use core::convert::Infallible;
 
 use embedded_hal::digital::{ErrorType, InputPin, OutputPin};
 
-use crate::pin::{Mode, Pin};
+use crate::{
+    boards::BOARD,
+    pin::{Mode, Pin},
+};
 
-/// A pin as an input or as a push-pull output. An input is pulled to the level that is set.
+/// A pin as an input or as a push-pull output. An input is pulled to the level that is set. [`Pin::NONE`] is always high.
 pub struct IoPin(Pin);
+
+/// Some channels of ports have no pin.
+pub(crate) const LACKS: bool = BOARD.lacks_channels();
 
 /// Call these in `init`, before the first interrupt.
 impl IoPin {
     /// Makes a pin an input with pull-up.
     pub(crate) fn pulled_up(pin: Pin) -> Self {
-        pin.pull_up();
-        Self(pin)
+        let io = Self(pin);
+        if io.exists() {
+            pin.pull_up();
+        }
+        io
     }
 
     /// Makes a pin an output that is low from the start, with the slowest edges.
@@ -28,9 +37,17 @@ impl IoPin {
     }
 
     fn starting(pin: Pin, high: bool) -> Self {
-        pin.set(high);
-        pin.configure(Mode::Output);
-        Self(pin)
+        let io = Self(pin);
+        if io.exists() {
+            pin.set(high);
+            pin.configure(Mode::Output);
+        }
+        io
+    }
+
+    #[inline(always)]
+    const fn exists(&self) -> bool {
+        !LACKS || !self.0.is_none()
     }
 }
 
@@ -40,22 +57,26 @@ impl ErrorType for IoPin {
 
 impl InputPin for IoPin {
     fn is_high(&mut self) -> Result<bool, Infallible> {
-        Ok(self.0.is_high())
+        Ok(!self.exists() || self.0.is_high())
     }
 
     fn is_low(&mut self) -> Result<bool, Infallible> {
-        Ok(!self.0.is_high())
+        self.is_high().map(|high| !high)
     }
 }
 
 impl OutputPin for IoPin {
     fn set_high(&mut self) -> Result<(), Infallible> {
-        self.0.set(true);
+        if self.exists() {
+            self.0.set(true);
+        }
         Ok(())
     }
 
     fn set_low(&mut self) -> Result<(), Infallible> {
-        self.0.set(false);
+        if self.exists() {
+            self.0.set(false);
+        }
         Ok(())
     }
 }

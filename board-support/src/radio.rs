@@ -45,9 +45,10 @@ pub struct Damaged;
 impl RadioOff {
     /// Sets up the UART and the pins: M0 and M1, which are high as the module pulls them, so that it is asleep until it
     /// has its settings, and AUX, which is pulled up.
-    /// Returns `None` when the clock cannot produce the baud rate; the radio then stays off.
+    /// Returns `None` when the board has no radio, or the clock cannot produce the baud rate; the radio then stays off.
     #[must_use]
     pub fn start(self, rcc: &mut pac::RCC) -> Option<(RadioUart, [IoPin; 2], IoPin)> {
+        let pins = BOARD.radio?;
         let divider = divider(self.clock.apb1_hz(), BAUD)?;
         pac::USART3::enable(rcc);
         pac::USART3::reset(rcc);
@@ -59,9 +60,9 @@ impl RadioOff {
         // The transmitter is on and drives high before the pin becomes its output.
         Pin::b(10).configure(Mode::Peripheral);
         Pin::b(11).pull_up();
-        let [m0, m1] = BOARD.radio.mode;
+        let [m0, m1] = pins.mode;
         let mode = [IoPin::high(m0), IoPin::high(m1)];
-        Some((uart, mode, IoPin::pulled_up(BOARD.radio.aux)))
+        Some((uart, mode, IoPin::pulled_up(pins.aux)))
     }
 }
 

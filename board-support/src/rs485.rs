@@ -1,19 +1,18 @@
-//! The RS-485 line: USART1 and the driver enable of its transceiver.
+//! The RS-485 line: the board's UART and the driver enable of its transceiver.
 //!
 //! The line is half duplex. While the unit sends, its receiver is off, so that it does not receive its own bytes
 //! even when the transceiver's receiver stays enabled. Each method serves one interrupt in a few instructions:
 //! [`Uart::status`] is read once and gives the reason for the interrupt.
 
-use stm32f1xx_hal::{
-    pac,
-    rcc::{Enable, Reset},
-};
+use stm32f1xx_hal::pac::{self, usart1::RegisterBlock};
 
 use crate::{
     ClockSource,
+    boards::BOARD,
     line::{Character, Uart},
-    pin::{Mode, Pin, Port},
+    pin::{Mode, Pin},
     uart::{Format, LineSettings, divider},
+    usart::Usart,
 };
 
 /// The UART's flags and interrupt enables, as [`Uart::status`] read them.
@@ -24,11 +23,6 @@ pub struct Status {
     enables: u16,
 }
 
-/// Modes of the pins in CRH: PA8 is an output and PA9 one of the UART, both at 10 MHz, PA10 is an input with pull-up
-/// (RM0008 table 20). 10 MHz gives a rise time of 25 ns (DS5319 table 37), which is 1/40 of a bit at 921600 bit/s.
-const MODES: u32 =
-    Mode::FastOutput as u32 | (Mode::FastPeripheral as u32) << 4 | (Mode::Pulled as u32) << 8;
-
 /// PE, FE and ORE, at the bit positions of [`Character::faults`].
 const FAULTS: u16 = 0b1011;
 const ORE: u16 = 1 << 3;
@@ -36,16 +30,59 @@ const RXNE: u16 = 1 << 5;
 const TC: u16 = 1 << 6;
 const TXE: u16 = 1 << 7;
 
+const UART: Usart = BOARD.line.uart;
 /// Driver enable of the transceiver.
-const DRIVER: Pin = Pin::a(8);
-const RX: Pin = Pin::a(10);
+const DRIVER: Pin = BOARD.line.driver;
 
 /// Configures the pins of the line so that nothing is sent: the driver is off, and TX still floats.
 pub(crate) fn set_up_pins() {
     disable_driver();
     // 10 MHz gives a rise time of 25 ns (DS5319 table 37), which is 1/40 of a bit at 921600 bit/s.
     DRIVER.configure(Mode::FastOutput);
-    RX.pull_up();
+    UART.rx().pull_up();
+}
+
+/// The modes of those pins of the line that are in one configuration register.
+struct Modes {
+    register: Pin,
+    mask: u32,
+    bits: u32,
+}
+
+impl Modes {
+    const OF_UART: Self = Self::beside(UART.tx());
+    const OF_DRIVER: Self = Self::beside(DRIVER);
+
+    /// Returns the modes in the register of a pin: the driver enable is an output and TX one of the UART, both at 10 MHz,
+    /// RX is an input with pull-up (RM0008 table 20).
+    const fn beside(register: Pin) -> Self {
+        let pins = [
+            (DRIVER, Mode::FastOutput),
+            (UART.tx(), Mode::FastPeripheral),
+            (UART.rx(), Mode::Pulled),
+        ];
+        let mask = BOARD.line.mode_bits(register.mode_register());
+        let (mut bits, mut n) = (0, 0);
+        while n < pins.len() {
+            let (pin, mode) = pins[n];
+            // Repeated for each pin of the register.
+            let modes = mode as u32 * 0x1111_1111;
+            if pin.mode_register() == register.mode_register() {
+                bits |= pin.mode_bits() & modes;
+            }
+            n += 1;
+        }
+        Self {
+            register,
+            mask,
+            bits,
+        }
+    }
+
+    #[inline(always)]
+    fn set(&self) {
+        self.register.change_modes(self.mask, self.bits);
+    }
 }
 
 /// Turns the driver off.
@@ -56,7 +93,6 @@ pub fn disable_driver() {
 
 /// The line in use.
 pub struct Rs485 {
-    usart: pac::USART1,
     divider: u16,
     format: Format,
     /// CR1 as it is written. It is computed once, because the compiler may make the match of [`receiving`] a table in
@@ -98,16 +134,13 @@ impl Rs485 {
     /// Sets the line up and turns the receiver on. Returns `None` when this clock cannot produce the rate; the line
     /// then stays off.
     pub(crate) fn new(
-        usart: pac::USART1,
         settings: LineSettings,
         clock: ClockSource,
         rcc: &mut pac::RCC,
     ) -> Option<Self> {
-        let divider = divider(clock.core_hz(), settings.baud)?;
-        pac::USART1::enable(rcc);
-        pac::USART1::reset(rcc);
+        let divider = divider(UART.hz(clock), settings.baud)?;
+        UART.enable(rcc);
         let mut line = Self {
-            usart,
             divider,
             format: settings.format,
             receiving: receiving(settings.format),
@@ -117,11 +150,16 @@ impl Rs485 {
         Some(line)
     }
 
+    #[inline(always)]
+    const fn usart(&self) -> &RegisterBlock {
+        UART.registers()
+    }
+
     /// The UART replaces the highest bit by the parity bit (RM0008 27.6.2).
     #[inline]
     fn write(&self, byte: u8) {
         let word = byte | self.stop_in_data;
-        self.usart.dr().write(|w| w.dr().set(u16::from(word)));
+        self.usart().dr().write(|w| w.dr().set(u16::from(word)));
     }
 }
 
@@ -146,7 +184,7 @@ impl Uart for Rs485 {
     /// A character under way is lost.
     fn set_up(&mut self) {
         disable_driver();
-        let usart = &self.usart;
+        let usart = self.usart();
         usart.cr1().reset();
         usart.cr3().reset();
         usart.gtpr().reset();
@@ -156,12 +194,11 @@ impl Uart for Rs485 {
             usart.cr2().write(|w| w.bits(stop_bits(self.format)));
             usart.cr1().write(|w| w.bits(self.receiving));
         }
-        // The transmitter is on and drives high before PA9 becomes its output.
-        // SAFETY: sets valid modes of these three pins and keeps the other bits.
-        Port::A
-            .registers()
-            .crh()
-            .modify(|r, w| unsafe { w.bits(r.bits() & !0xFFF | MODES) });
+        // The transmitter is on and drives high before TX becomes its output.
+        Modes::OF_UART.set();
+        if DRIVER.mode_register() != UART.tx().mode_register() {
+            Modes::OF_DRIVER.set();
+        }
         // Discard what was received before, including its error flags; it is not part of the next frame.
         let _ = (usart.sr().read(), usart.dr().read());
     }
@@ -170,9 +207,9 @@ impl Uart for Rs485 {
     fn disable_other_interrupts(&mut self) -> bool {
         /// IDLEIE and PEIE.
         const OTHERS: u16 = 1 << 4 | 1 << 8;
-        let settings = self.usart.cr1().read().bits();
+        let settings = self.usart().cr1().read().bits();
         // SAFETY: clears bits of the present settings.
-        self.usart
+        self.usart()
             .cr1()
             .write(|w| unsafe { w.bits(settings & !OTHERS) });
         settings & OTHERS != 0
@@ -186,8 +223,8 @@ impl Uart for Rs485 {
     #[inline]
     fn status(&self) -> Status {
         Status {
-            flags: self.usart.sr().read().bits(),
-            enables: self.usart.cr1().read().bits(),
+            flags: self.usart().sr().read().bits(),
+            enables: self.usart().cr1().read().bits(),
         }
     }
 
@@ -195,7 +232,7 @@ impl Uart for Rs485 {
     fn read(&mut self, status: Status) -> Character {
         Character {
             // With words of nine bits, the ninth is the parity bit.
-            byte: self.usart.dr().read().bits() as u8,
+            byte: self.usart().dr().read().bits() as u8,
             faults: (status.flags & FAULTS) as u8,
         }
     }
@@ -205,9 +242,9 @@ impl Uart for Rs485 {
     fn start_sending(&mut self, first: u8) {
         DRIVER.set(true);
         // Reading SR and then writing DR clears TC (RM0008 27.6.1).
-        let _ = self.usart.sr().read();
+        let _ = self.usart().sr().read();
         self.write(first);
-        self.usart
+        self.usart()
             .cr1()
             .modify(|_, w| w.re().disabled().rxneie().disabled().txeie().enabled());
     }
@@ -218,15 +255,15 @@ impl Uart for Rs485 {
         // When this runs late, the previous byte may end between the read of SR and the write to DR, which then
         // does not clear TC (RM0008 27.6.1). This byte cannot have ended yet, so a TC that is set belongs to the
         // previous one. It would switch the driver off too early.
-        if self.usart.sr().read().tc().bit_is_set() {
+        if self.usart().sr().read().tc().bit_is_set() {
             // SAFETY: writing 1 leaves the other flags of SR unchanged, or they cannot be written.
-            self.usart.sr().write(|w| unsafe { w.bits(!TC) });
+            self.usart().sr().write(|w| unsafe { w.bits(!TC) });
         }
     }
 
     #[inline]
     fn finish_sending(&mut self) {
-        self.usart
+        self.usart()
             .cr1()
             .modify(|_, w| w.txeie().disabled().tcie().enabled());
     }
@@ -234,7 +271,7 @@ impl Uart for Rs485 {
     #[inline]
     fn stop_sending(&mut self) {
         disable_driver();
-        self.usart
+        self.usart()
             .cr1()
             .modify(|_, w| w.tcie().disabled().re().enabled().rxneie().enabled());
     }

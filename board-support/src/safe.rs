@@ -2,7 +2,7 @@
 
 use stm32f1xx_hal::pac;
 
-use crate::{boards::BOARD, pin::Mode, rs485};
+use crate::{boards::BOARD, pin::Mode, pin_io::LACKS, rs485};
 
 /// Makes the lines of all slots floating inputs, which turns every module's outputs off, and turns the RS-485
 /// driver off. For fault handlers, after which the interrupted program does not run again; it ignores who owns the
@@ -26,7 +26,9 @@ pub fn outputs_off() {
     rs485::disable_driver();
     for slot in BOARD.slots {
         for line in slot.lines {
-            line.configure(Mode::Floating);
+            if !LACKS || !line.is_none() {
+                line.configure(Mode::Floating);
+            }
         }
     }
 }

@@ -123,6 +123,17 @@ mod tests {
     }
 
     #[test]
+    fn uart_with_half_the_clock_has_every_rate_but_the_highest_without_crystal() {
+        for baud in [1200, 115_200, 230_400, 460_800] {
+            for clock in [SYSCLK_ON_HSE_HZ, SYSCLK_ON_HSI_HZ] {
+                assert!(divider(clock / 2, baud).is_some(), "{baud} at {clock}");
+            }
+        }
+        assert_eq!(divider(SYSCLK_ON_HSE_HZ / 2, 921_600), Some(39));
+        assert_eq!(divider(SYSCLK_ON_HSI_HZ / 2, 921_600), None);
+    }
+
+    #[test]
     fn a_rate_out_of_tolerance_has_no_divider() {
         assert_eq!(divider(72_000_000, 0), None);
         assert_eq!(divider(72_000_000, 300), None, "the divider has 16 bits");

@@ -24,3 +24,14 @@ pub(crate) fn move_to_ram(scb: &SCB) {
     unsafe { scb.vtor.write(table as u32) };
     cortex_m::asm::dsb();
 }
+
+/// Enters the handler of an interrupt in the table in RAM. The interrupt must be disabled.
+pub(crate) fn set(interrupt: u16, handler: extern "C" fn()) {
+    // SAFETY: the table has an entry for every interrupt of the part, after the 16 of the core. The core reads an entry
+    // only when its interrupt is enabled.
+    unsafe {
+        let entry = (&raw mut _ram_vectors).add(16 + usize::from(interrupt));
+        entry.write_volatile(handler as usize as u32);
+    }
+    cortex_m::asm::dsb();
+}

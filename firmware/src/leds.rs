@@ -10,6 +10,8 @@
 //! | | is dark: no fault |
 //!
 //! After COMMAND 6, identify, all three blink together for 10 s in place of these patterns.
+//!
+//! A board with one LED shows the pattern of the fault on it, or else that of running. Activity inverts it.
 
 use embedded_hal::digital::{OutputPin, PinState};
 
@@ -62,9 +64,10 @@ impl Trouble {
 
 /// The LEDs for activity, fault and running, and the state of their patterns.
 #[derive(Debug)]
-pub struct Leds<P> {
-    /// High lights activity and fault. The running LED is connected to the supply, so low lights it.
-    pins: [P; 3],
+pub struct Leds<P, const N: usize> {
+    /// High lights activity and fault. The running LED, which is the last or the only one, is connected to the supply, so
+    /// low lights it.
+    pins: [P; N],
     /// A fault that lasts as long as the device runs.
     standing: Trouble,
     /// Time when the LEDs were last set, in milliseconds since the start.
@@ -77,10 +80,10 @@ pub struct Leds<P> {
     identify: u16,
 }
 
-impl<P> Leds<P> {
-    /// Starts the patterns. `pins` are those of activity, fault and running.
+impl<P, const N: usize> Leds<P, N> {
+    /// Starts the patterns. `pins` are those of activity, fault and running, or only that of running.
     #[must_use]
-    pub const fn new(pins: [P; 3], standing: Trouble) -> Self {
+    pub const fn new(pins: [P; N], standing: Trouble) -> Self {
         Self {
             pins,
             standing,
@@ -112,17 +115,24 @@ impl<P> Leds<P> {
             // Lit for the first 200 ms, dark for the last 200 ms.
             return [!(left / BLINK).is_multiple_of(2); 3];
         }
-        let fault = match self.standing.or_module(module_fails) {
+        let trouble = self.standing.or_module(module_fails);
+        let fault = match trouble {
             Trouble::NoAddress => (tick / BLINK).is_multiple_of(2),
             Trouble::Module => true,
             Trouble::NoCrystal => tick < FLASH,
             Trouble::None => false,
         };
-        [self.activity > 0, fault, (tick / RUN).is_multiple_of(2)]
+        let (active, run) = (self.activity > 0, (tick / RUN).is_multiple_of(2));
+        let last = match trouble {
+            _ if N > 1 => run,
+            Trouble::None => run != active,
+            _ => fault != active,
+        };
+        [active, fault, last]
     }
 }
 
-impl<P: OutputPin> Leds<P> {
+impl<P: OutputPin, const N: usize> Leds<P, N> {
     /// Sets the LEDs, if their next step is due. `request` says that a request has been served since the last call.
     pub fn show(&mut self, millis: u32, module_fails: bool, request: bool) {
         self.requested |= request;
@@ -132,7 +142,8 @@ impl<P: OutputPin> Leds<P> {
         self.set_at = millis;
         let request = core::mem::take(&mut self.requested);
         let [activity, fault, run] = self.tick(request, module_fails);
-        for (pin, high) in self.pins.iter_mut().zip([activity, fault, !run]) {
+        let levels = [activity, fault, !run];
+        for (pin, high) in self.pins.iter_mut().zip(levels.into_iter().skip(3 - N)) {
             let _ = pin.set_state(PinState::from(high));
         }
     }
@@ -165,6 +176,21 @@ mod tests {
         assert_eq!(measure(Trouble::Module, FAULT), (2000, 0));
         assert_eq!(measure(Trouble::NoCrystal, FAULT), (100, 1));
         assert_eq!(measure(Trouble::None, RUNNING), (1000, 2));
+    }
+
+    #[test]
+    fn only_led_shows_the_fault_or_else_running_and_activity_inverts_it() {
+        let lit = |trouble, request| {
+            let mut leds = Leds::new([()], trouble);
+            let lit = (0..PERIOD).filter(|_| leds.tick(request, false)[RUNNING]);
+            lit.count() as u16 * TICK_MS
+        };
+        assert_eq!(lit(Trouble::None, false), 1000);
+        assert_eq!(lit(Trouble::NoCrystal, false), 100);
+        assert_eq!(lit(Trouble::NoCrystal, true), 1900);
+        assert_eq!(lit(Trouble::Module, false), 2000);
+        let mut leds = Leds::new([()], Trouble::None);
+        assert!(leds.tick(false, false)[RUNNING] && !leds.tick(true, false)[RUNNING]);
     }
 
     #[test]

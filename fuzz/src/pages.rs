@@ -2,12 +2,11 @@
 
 use std::fmt;
 
-use firmware::config::Settings;
 use register_map::board::MODIO_02;
 use register_map::record::{BEGINNING, SEALS};
 
 use crate::PAGE_SIZE;
-use crate::running::random_settings;
+use crate::running::{Settings, random_settings};
 use crate::script::Script;
 
 /// The two pages of a store.
@@ -86,7 +85,7 @@ impl Found {
     #[must_use]
     pub fn good(settings: &Settings) -> Self {
         Self {
-            settings: settings.clone(),
+            settings: *settings,
             invalid: false,
             rejected: 0,
         }
@@ -97,7 +96,7 @@ impl Found {
     pub fn damaged() -> Self {
         Self {
             invalid: true,
-            ..Self::good(&Settings::defaults())
+            ..Self::good(&Settings::defaults(&MODIO_02))
         }
     }
 }
@@ -135,7 +134,7 @@ pub fn read(pages: &Pages) -> Vec<Found> {
     let Some((first, _)) = all.first() else {
         let vacant = pages.iter().all(|page| is_vacant(page));
         return vec![if vacant {
-            Found::good(&Settings::defaults())
+            Found::good(&Settings::defaults(&MODIO_02))
         } else {
             Found::damaged()
         }];

@@ -13,14 +13,13 @@
 //!           6 save of two settings  4 bytes    7 save of what is stored
 //! ```
 
-use firmware::config::Settings;
-use firmware::store::{Loaded, Page, Store, WriteError};
+use firmware::store::{Page, Store, WriteError};
 use register_map::board::MODIO_02;
 
 use crate::PAGE_SIZE;
 use crate::flash::{Fault, Mess, MockFlash};
 use crate::pages::{self, Found};
-use crate::running::{fullest_settings, random_settings, save};
+use crate::running::{Loaded, Settings, fullest_settings, random_settings, save};
 use crate::script::Script;
 
 /// Enough events to fill both pages several times.
@@ -95,7 +94,7 @@ impl Life {
             }
             _ => {
                 self.start();
-                let stored = self.expected[0].settings.clone();
+                let stored = self.expected[0].settings;
                 self.save(&stored);
             }
         }
@@ -108,7 +107,10 @@ impl Life {
         if reads_otherwise && pages::nothing_good(&self.flash.pages) {
             // An interrupted erase may leave data that looks like something stored at one start and like nothing at
             // the next.
-            self.expected = vec![Found::good(&Settings::defaults()), Found::damaged()];
+            self.expected = vec![
+                Found::good(&Settings::defaults(&MODIO_02)),
+                Found::damaged(),
+            ];
         }
     }
 

@@ -51,13 +51,13 @@ impl Text {
     #[must_use]
     pub const fn scope(&self, count: u16) -> Scope {
         let values = match self.value.registers() {
-            Some(1) => count,
-            Some(_) => count / 2,
+            Some(registers) => count / registers,
             None => 1,
         };
         match values {
-            port::COUNT => Scope::Point,
             port::PORTS => Scope::Port,
+            // A point may have several values: those of the second row follow the first of all points.
+            port::COUNT.. if values.is_multiple_of(port::COUNT) => Scope::Point,
             _ => Scope::Unit,
         }
     }

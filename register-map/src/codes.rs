@@ -223,6 +223,27 @@ codes! {
 }
 
 codes! {
+    /// ACTION of a link, and in the high byte WHEN it acts: 1 stands for *only while the communication watchdog has
+    /// expired*.
+    LinkAction {
+        None = 0x000 "none",
+        Follow = 0x001 "follow",
+        Invert = 0x002 "invert",
+        Toggle = 0x003 "toggle",
+        Pulse = 0x004 "pulse",
+        Set = 0x005 "set",
+        Reset = 0x006 "reset",
+        NoneAlone = 0x100 "none if alone",
+        FollowAlone = 0x101 "follow if alone",
+        InvertAlone = 0x102 "invert if alone",
+        ToggleAlone = 0x103 "toggle if alone",
+        PulseAlone = 0x104 "pulse if alone",
+        SetAlone = 0x105 "set if alone",
+        ResetAlone = 0x106 "reset if alone",
+    }
+}
+
+codes! {
     /// State of a module.
     ModuleState {
         Good = 0 "good",

@@ -51,9 +51,9 @@ const LORA_MHZ: Value = Value::Number(Unit {
 block! {
     "Configuration", 0x0100..=0x01FF;
 
-    /// 0x5A17 unlocks for 60 s. Reads 1 while unlocked
+    /// 0x5A17 unlocks for 60 s. Reads 1 then
     KEY "KEY": 0x0100 x 1, Value::NUMBER, Rule::now(Values::only(OPENING_KEY), 0);
-    /// Speed of the RS-485 line
+    /// Speed of the line
     BAUD "BAUD": 0x0101 x 1, Value::tens("bit/s", 2), Rule::restart(Values::OneOf(Baud::CODES), 96);
     /// Data, parity and stop bits. 7 bits need MODE 1
     FORMAT "FORMAT": 0x0102 x 1, Value::Codes(Format::NAMES), Rule::restart(Values::up_to(6), 0);
@@ -63,7 +63,7 @@ block! {
     COMM_TIMEOUT "COMM_TIMEOUT": 0x0104 x 1, Value::tens("s", -1), Rule::now(Values::up_to(36_000), 0);
     /// Pause before a response, beyond t3.5
     RESPONSE_DELAY "RESPONSE_DELAY": 0x0105 x 1, Value::number("ms"), Rule::now(Values::up_to(1000), 0);
-    /// Silence that ends a frame; 0 = t3.5 of the standard
+    /// Silence that ends a frame; 0 = t3.5
     FRAME_GAP "FRAME_GAP": 0x0106 x 1, Value::tens("ms", -1), Rule::restart(Values::range(2, 1000).or(0), 0);
     /// Frames with a gap above t1.5
     STRICT_T15 "STRICT_T15": 0x0107 x 1, Value::Codes(GapRule::NAMES), Rule::restart(Values::up_to(1), 0);
@@ -71,7 +71,9 @@ block! {
     COMMAND "COMMAND": 0x0108 x 1, Value::Codes(Command::NAMES), Rule::now(Values::OneOf(Command::CODES), 0);
     /// Requests that restart COMM_TIMEOUT
     COMM_SOURCE "COMM_SOURCE": 0x0109 x 1, Value::Codes(CommSource::NAMES), Rule::now(Values::up_to(3), 0);
-    /// Low word of the serial number for function 70; 0 = from the unique identity
+    /// Unit address of a board without switch
+    UNIT "UNIT": 0x010A x 1, Value::NUMBER, Rule::restart(Values::range(1, 247), 1);
+    /// Low word of the serial number; 0 = from the unique identity
     SERIAL_LOW "SERIAL_LOW": 0x010B x 1, Value::NUMBER, Rule::restart(Values::ANY, 0);
     /// Module in the slot
     MODULE "MODULE": 0x0110 x 8, Value::Codes(Module::NAMES), Rule::restart(Values::up_to(Module::LAST), 0);
@@ -87,7 +89,7 @@ block! {
     LORA_AIR_RATE "LORA_AIR_RATE": 0x0143 x 1, Value::Codes(AirRate::NAMES), Rule::restart(Values::up_to(5), 2);
     /// Power on the air
     LORA_POWER "LORA_POWER": 0x0144 x 1, Value::Codes(Power::NAMES), Rule::restart(Values::up_to(3), 0);
-    /// Silence that ends an incomplete frame
+    /// Silence that ends a frame on the air
     LORA_FRAME_GAP "LORA_FRAME_GAP": 0x0145 x 1, Value::number("ms"), Rule::restart(Values::range(5, 500), 300);
     /// Constant of an NTC
     BETA "BETA": 0x0160 x 32, Value::number("K"), Rule::now(Values::range(BETA_MIN, BETA_MAX), BETA_DEFAULT);

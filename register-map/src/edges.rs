@@ -8,7 +8,7 @@ use crate::value::Value;
 block! {
     "Last edges of digital inputs", 0x0380..=0x03BF;
 
-    /// Uptime of the last edge after debounce; 0 = none since the start
+    /// Uptime of the last edge; 0 = none
     LAST_EDGE "last edge": 0x0380 x 64, Value::long("ms"), Rule::read_only();
 }
 

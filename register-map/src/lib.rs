@@ -32,9 +32,11 @@ pub mod configuration;
 pub mod counters;
 pub mod edges;
 pub mod fault;
+mod fixed;
 mod kind;
 pub mod layout;
 pub mod limits;
+pub mod links;
 mod module;
 pub mod name;
 pub mod part;
@@ -51,15 +53,16 @@ mod values;
 pub use block::{Block, Scope, Text};
 pub use board::Board;
 pub use commit::first_32_bits;
+pub use fixed::FixedPort;
 #[doc(hidden)]
 pub use git_version::git_version;
 pub use module::{Module, UnknownModule};
 pub use rule::{Access, InForce, Narrower, Rule, Run, Runs, rule_at, runs};
-pub use value::{Unit, Value};
+pub use value::{Field, Unit, Value};
 pub use values::Values;
 
 /// Every block, in ascending order of the addresses.
-pub static BLOCKS: [&Block; 8] = [
+pub static BLOCKS: [&Block; 9] = [
     &points::BLOCK,
     &name::BLOCK,
     &configuration::BLOCK,
@@ -68,4 +71,5 @@ pub static BLOCKS: [&Block; 8] = [
     &radio::BLOCK,
     &counters::BLOCK,
     &edges::BLOCK,
+    &links::BLOCK,
 ];

@@ -135,7 +135,7 @@ block! {
     MODULE_STATE "module state": 0x0218 x 8, Value::Codes(ModuleState::NAMES), READ;
     /// 96 bits
     UNIQUE_ID "unique device identity": 0x0220 x 6, Value::Opaque, READ;
-    /// Time since the start; wraps after 49 days
+    /// Time since the start
     UPTIME_MS "uptime ms": 0x0226 x 2, Value::long("ms"), READ;
     /// For function 70
     SERIAL_NUMBER "serial number": 0x0228 x 2, Value::Opaque, READ;

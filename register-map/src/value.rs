@@ -2,6 +2,9 @@
 
 use core::fmt;
 
+use crate::kind::Kind;
+use crate::values::Values;
+
 /// Kind of content of a register or of a run of similar ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Value {
@@ -15,6 +18,36 @@ pub enum Value {
     Bits(&'static [(u8, &'static str)]),
     /// Registers that have a meaning only together, such as an identity. Shown in hexadecimal.
     Opaque,
+    /// The address of a point; 0xFFFF = none.
+    Point,
+    /// Consecutive registers with a meaning of their own, which only points of this kind have. They are written together.
+    Fields(Kind, &'static [Field]),
+}
+
+/// One of the registers of a [`Value::Fields`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Field {
+    /// Name.
+    pub name: &'static str,
+    /// Meaning of its number: one register, which is not [`Value::Fields`] itself.
+    pub value: Value,
+    /// Allowed values. Others of the fields may restrict them.
+    pub values: Values,
+    /// Factory default.
+    pub default: u16,
+}
+
+impl Field {
+    /// Returns a field.
+    #[must_use]
+    pub const fn new(name: &'static str, value: Value, values: Values, default: u16) -> Self {
+        Self {
+            name,
+            value,
+            values,
+            default,
+        }
+    }
 }
 
 impl Value {
@@ -53,7 +86,9 @@ impl Value {
     pub const fn unit(self) -> Unit {
         match self {
             Self::Number(unit) | Self::Long(unit) => unit,
-            Self::Codes(_) | Self::Bits(_) | Self::Opaque => Unit::NONE,
+            Self::Codes(_) | Self::Bits(_) | Self::Opaque | Self::Point | Self::Fields(..) => {
+                Unit::NONE
+            }
         }
     }
 
@@ -61,9 +96,10 @@ impl Value {
     #[must_use]
     pub const fn registers(self) -> Option<u16> {
         match self {
-            Self::Number(_) | Self::Codes(_) | Self::Bits(_) => Some(1),
+            Self::Number(_) | Self::Codes(_) | Self::Bits(_) | Self::Point => Some(1),
             Self::Long(_) => Some(2),
             Self::Opaque => None,
+            Self::Fields(_, fields) => Some(fields.len() as u16),
         }
     }
 }

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use register_map::points::Kind;
 use register_map::{
-    BLOCKS, Block, Board, InForce, Module, Rule, Scope, Text, Unit, Value, Values, codes,
-    configuration, counters, edges, fault, points,
+    BLOCKS, Block, Board, Field, InForce, Module, Rule, Scope, Text, Unit, Value, Values, codes,
+    configuration, counters, edges, fault, links, points,
 };
 
 const INTRODUCTION: &str = "\
@@ -66,6 +66,12 @@ The uptime is that of 0x0226. File 3 (function 14) is the log of the last 64 edg
 [time-and-links.md](time-and-links.md).
 ";
 
+const LINK_NOTES: &str = "
+n is the point of a digital output of the module written last; other addresses are exception 02, and on a board with one
+slot all are. Links are settings: KEY protects them, COMMAND 1 saves them, and they are in force immediately. A link is
+checked as a whole: [time-and-links.md](time-and-links.md).
+";
+
 const FAULT_NOTES: &str = "
 The record survives every reset but a loss of power. A new fault replaces it. Line repairs start at 0 with each start and
 stop at 65535.
@@ -115,12 +121,19 @@ fn write_markdown(out: &mut impl Write) -> Result {
             out.write_str(COUNTER_NOTES)?;
         } else if block.first == edges::BLOCK.first {
             out.write_str(EDGE_NOTES)?;
+        } else if block.first == links::BLOCK.first {
+            out.write_str(LINK_NOTES)?;
         }
     }
     Ok(())
 }
 
 fn write_registers(block: &Block, out: &mut impl Write) -> Result {
+    if let [(rule, text)] = block.registers().collect::<Vec<_>>()[..]
+        && let Value::Fields(_, fields) = text.value
+    {
+        return write_fields(rule, text.name, fields, out);
+    }
     let settings = block.first == configuration::BLOCK.first;
     out.write_str(if settings {
         "| address | name | values (default) | unit | in force | what |\n|---|---|---|---|---|---|\n"
@@ -157,6 +170,30 @@ fn write_registers(block: &Block, out: &mut impl Write) -> Result {
             Scope::Point => "By point. ",
         })?;
         write_about(text, out)?;
+        out.write_str(" |\n")?;
+    }
+    Ok(())
+}
+
+/// Writes the registers of each value of a run as rows. n is the point, and each following value of a point is in the next
+/// row of all points.
+fn write_fields(rule: &Rule, name: &str, fields: &[Field], out: &mut impl Write) -> Result {
+    out.write_str("| address | name | values (default) | meaning |\n|---|---|---|---|\n")?;
+    let length = fields.len() as u16;
+    for (address, field) in (rule.first..).zip(fields) {
+        let row = points::COUNT * length;
+        let firsts = (address..rule.end()).step_by(row.into());
+        let firsts: Vec<_> = firsts
+            .map(|first| format!("{first:#06X} + {length} n"))
+            .collect();
+        write!(out, "| {} | {name} {} | ", firsts.join(", "), field.name)?;
+        write_set(field.values, out)?;
+        match field.default {
+            0..0x8000 => write!(out, " ({})", field.default)?,
+            _ => write!(out, " ({:#06X})", field.default)?,
+        }
+        out.write_str(" |")?;
+        write_meaning(field.value, " ", out)?;
         out.write_str(" |\n")?;
     }
     Ok(())
@@ -215,8 +252,13 @@ fn write_range(min: u16, max: u16, out: &mut impl Write) -> Result {
 
 fn write_about(text: &Text, out: &mut impl Write) -> Result {
     out.write_str(text.about.trim())?;
-    let separator = |i| if i == 0 { ": " } else { ", " };
-    match text.value {
+    write_meaning(text.value, ": ", out)
+}
+
+/// Writes the names of codes or bits, with `start` before the first.
+fn write_meaning(value: Value, start: &str, out: &mut impl Write) -> Result {
+    let separator = |i| if i == 0 { start } else { ", " };
+    match value {
         Value::Codes(codes) => {
             for (i, (code, name)) in codes.iter().enumerate() {
                 out.write_str(separator(i))?;
@@ -231,7 +273,8 @@ fn write_about(text: &Text, out: &mut impl Write) -> Result {
                 write!(out, "{}bit {bit} {name}", separator(i))?;
             }
         }
-        Value::Number(_) | Value::Long(_) | Value::Opaque => {}
+        Value::Point => write!(out, "{start}address of a point, 0xFFFF = none")?,
+        Value::Number(_) | Value::Long(_) | Value::Opaque | Value::Fields(..) => {}
     }
     Ok(())
 }

@@ -2,34 +2,72 @@
 //! register-map, which the linker script has from there.
 //!
 //! A cargo feature with the board's name selects the board. [`board`](crate::board) holds what all boards share:
-//! the RS-485 line on PA8 to PA10, the radio's UART on PB10 and PB11, the DACs' bus on PB6 and PB7, the LEDs on PB8,
-//! PB9 and PC13.
+//! the radio's UART on PB10 and PB11, and the DACs' bus on PB6 and PB7.
 
 pub mod modio_02;
 pub mod modio_08;
 
-use crate::pin::Pin;
+use crate::{
+    gesture::Gesture,
+    pin::{Pin, Port},
+    usart::Usart,
+};
 
 /// A board.
 #[derive(Clone, Copy, Debug)]
 pub struct Descriptor {
     /// The board's name, as in its row in crate register-map.
     pub name: &'static str,
+    /// AFIO_MAPR, which is written once: remapped pins, and whether the pins of the debug port are free (RM0008 9.4.2).
+    pub mapr: u32,
+    /// The RS-485 line.
+    pub line: LinePins,
+    /// The last port with pins that are used. The clocks of the ports from A to this one are on.
+    pub last_port: Port,
+    /// Pins that are outputs with a level, true is high, from the first instructions of loader and application on.
+    pub held: &'static [(Pin, bool)],
     /// The slots in the order of their ports. The port numbers are consecutive.
     pub slots: &'static [SlotPins],
-    /// The pins of SW01, position 1 first. A position that is ON connects its pin to ground.
-    pub switch: [Pin; 8],
+    /// What sets the unit address.
+    pub address: AddressPins,
+    /// The LEDs for activity, fault and running, or only that for running. High lights activity and fault, low lights
+    /// running.
+    pub leds: &'static [Pin],
     /// The pins of the LoRa radio, besides its UART on PB10 and PB11.
-    pub radio: RadioPins,
+    pub radio: Option<RadioPins>,
 }
 
-/// The pins and the DAC address of a slot.
+/// What sets the unit address.
+#[derive(Clone, Copy, Debug)]
+pub enum AddressPins {
+    /// The pins of SW01, position 1 first. A position that is ON connects its pin to ground.
+    Switch([Pin; 8]),
+    /// Register UNIT. This gesture starts recovery.
+    Register(Gesture),
+}
+
+/// The UART of the RS-485 line and its pins.
+#[derive(Clone, Copy, Debug)]
+pub struct LinePins {
+    /// The UART, whose pins for TX and RX follow from it.
+    pub uart: Usart,
+    /// Driver enable of the transceiver: high turns the driver on.
+    pub driver: Pin,
+}
+
+/// The pins of a port: of a slot, or of fixed inputs or outputs.
 #[derive(Clone, Copy, Debug)]
 pub struct SlotPins {
-    /// Lines 1 to 4. Each is also an input of ADC1.
+    /// Lines 1 to 4. In a slot each is also an input of ADC1. A fixed port may lack some, [`Pin::NONE`].
     pub lines: [Pin; 4],
     /// I2C address of an analog-output module's DAC in this slot, 0x60 to 0x67. Each slot has a different address.
+    /// [`FIXED`](Self::FIXED) on a port without slot.
     pub dac_address: u8,
+}
+
+impl SlotPins {
+    /// No DAC, because the port is not a slot.
+    pub const FIXED: u8 = 0;
 }
 
 /// The pins of the LoRa radio.
@@ -41,17 +79,77 @@ pub struct RadioPins {
     pub aux: Pin,
 }
 
+impl LinePins {
+    /// Returns the pin whose edges raise an interrupt: RX, unless a timer captures them.
+    #[must_use]
+    pub const fn edge(&self) -> Option<Pin> {
+        if self.uart.is_captured() {
+            None
+        } else {
+            Some(self.uart.rx())
+        }
+    }
+
+    /// Returns the bits of the line's pins in a configuration register.
+    #[must_use]
+    pub const fn mode_bits(&self, register: u32) -> u32 {
+        let pins = [self.driver, self.uart.tx(), self.uart.rx()];
+        let (mut bits, mut n) = (0, 0);
+        while n < pins.len() {
+            if pins[n].mode_register() == register {
+                bits |= pins[n].mode_bits();
+            }
+            n += 1;
+        }
+        bits
+    }
+}
+
 impl Descriptor {
-    /// Checks the descriptor at compile time.
-    const fn check(&self) {
-        assert!(self.slots.len() <= 8, "a board has at most 8 ports");
+    /// Returns whether some channels of ports have no pin.
+    #[must_use]
+    pub const fn lacks_channels(&self) -> bool {
         let mut slot = 0;
         while slot < self.slots.len() {
             let mut line = 0;
             while line < 4 {
-                let pin = self.slots[slot].lines[line];
+                if self.slots[slot].lines[line].is_none() {
+                    return true;
+                }
+                line += 1;
+            }
+            slot += 1;
+        }
+        false
+    }
+
+    /// Returns whether there is a bus to DACs: in every slot can be a module that has one.
+    #[must_use]
+    pub const fn has_dacs(&self) -> bool {
+        let mut slot = 0;
+        while slot < self.slots.len() {
+            if self.slots[slot].dac_address != SlotPins::FIXED {
+                return true;
+            }
+            slot += 1;
+        }
+        false
+    }
+
+    /// Checks the descriptor at compile time.
+    const fn check(&self) {
+        assert!(self.slots.len() <= 8, "a board has at most 8 ports");
+        assert!(
+            matches!(self.leds.len(), 1 | 3),
+            "a board has one LED or three"
+        );
+        let mut slot = 0;
+        while slot < self.slots.len() {
+            let SlotPins { lines, dac_address } = self.slots[slot];
+            let mut line = 0;
+            while line < 4 {
                 assert!(
-                    pin.adc_input().is_some(),
+                    dac_address == SlotPins::FIXED || lines[line].adc_input().is_some(),
                     "every line of a slot must be an ADC input"
                 );
                 line += 1;
@@ -65,10 +163,14 @@ const _: () = modio_02::BOARD.check();
 const _: () = modio_08::BOARD.check();
 
 // Set exactly one board feature. With two features BOARD is defined twice, without one it is not defined.
-#[cfg(feature = "modio-02")]
+#[cfg(any(feature = "modio-02", test))]
 pub use modio_02::BOARD;
 #[cfg(feature = "modio-08")]
 pub use modio_08::BOARD;
+
+/// Number of LEDs of the board.
+#[cfg(target_os = "none")]
+pub const LEDS: usize = BOARD.leds.len();
 
 /// Number of slots of the board.
 #[cfg(target_os = "none")]

@@ -1,11 +1,21 @@
 //! The modio-08: an STM32F103RC. Four slots, ports 1 to 4.
 
-use super::{Descriptor, RadioPins, SlotPins};
-use crate::pin::Pin;
+use super::{AddressPins, Descriptor, LinePins, RadioPins, SlotPins};
+use crate::{
+    pin::{Pin, Port},
+    usart::Usart,
+};
 
 /// The modio-08.
 pub const BOARD: Descriptor = Descriptor {
     name: "modio-08",
+    mapr: 0,
+    line: LinePins {
+        uart: Usart::Usart1,
+        driver: Pin::a(8),
+    },
+    last_port: Port::C,
+    held: &[],
     slots: &[
         SlotPins {
             lines: [Pin::a(0), Pin::a(1), Pin::a(2), Pin::a(3)],
@@ -24,7 +34,7 @@ pub const BOARD: Descriptor = Descriptor {
             dac_address: 0x63,
         },
     ],
-    switch: [
+    address: AddressPins::Switch([
         Pin::c(6),
         Pin::c(7),
         Pin::c(8),
@@ -33,9 +43,10 @@ pub const BOARD: Descriptor = Descriptor {
         Pin::b(13),
         Pin::b(14),
         Pin::b(15),
-    ],
-    radio: RadioPins {
+    ]),
+    leds: &[Pin::b(8), Pin::b(9), Pin::c(13)],
+    radio: Some(RadioPins {
         mode: [Pin::c(10), Pin::c(11)],
         aux: Pin::c(12),
-    },
+    }),
 };

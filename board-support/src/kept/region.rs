@@ -125,6 +125,11 @@ pub(crate) fn keep_dip(dip: u8) {
     update(None, FLAGS, DIP, HAS_DIP | u32::from(dip));
 }
 
+/// Keeps that every start until the next power-on is one of recovery, as with SW01 = 255. For the background task.
+pub fn keep_recovery() {
+    keep_dip(u8::MAX);
+}
+
 /// Keeps the number of saves that the firmware may still write to flash. For the background task.
 pub fn keep_saves(left: u8) {
     let saves = sealed::saves(left);

@@ -1,7 +1,12 @@
 //! Background work that is not urgent: DAC transfers, configuration store, LEDs, log.
 
-use board_support::{IoPin, boards::SLOTS, kept, stack::LowWater};
-use firmware::leds::Leds;
+use board_support::{
+    IoPin, RecoveryPins,
+    boards::{LEDS, SLOTS},
+    kept,
+    stack::LowWater,
+};
+use firmware::{device::Restart, leds::Leds};
 use heapless::spsc::Consumer;
 use modio_drivers::DacLink;
 use rtic::Mutex;
@@ -19,7 +24,8 @@ pub struct Background {
     pub analog_outputs: AnalogOutputs,
     pub persistence: Persistence,
     pub updating: Updating,
-    pub leds: Leds<IoPin>,
+    pub leds: Leds<IoPin, LEDS>,
+    pub recovery: RecoveryPins,
     pub log: Log,
     pub stack: LowWater,
     /// The state of the radio that was logged last.
@@ -57,6 +63,12 @@ impl Background {
             && self.radio.replace(works) != radio
         {
             self.log.event(Event::Radio(works));
+        }
+        if self.recovery.is_asked(millis) {
+            kept::keep_recovery();
+            device.lock(|device| {
+                device.restart.get_or_insert(Restart::Asked);
+            });
         }
         if identify {
             self.leds.identify();

@@ -19,5 +19,8 @@ pub const DESCRIPTION: &Fixed = &Fixed::of(BOARD);
 /// The device with this board's number of slots.
 pub type Device = firmware::device::Device<{ boards::SLOTS }>;
 
+/// The settings of this board.
+pub type Settings = firmware::config::Settings<{ boards::SLOTS }>;
+
 // The register map and the pin descriptor mean the same board.
 const _: () = assert!(BOARD.slots as usize == boards::SLOTS);

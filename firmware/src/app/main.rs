@@ -3,11 +3,11 @@
 //! | task | bound to | priority | duty, and what an overrun costs |
 //! |---|---|---|---|
 //! | `beat` | TIM4, 1 kHz | 4 | advances the device's clock, runs the line's response delay, checks the registers, pends `scan`. If late, the clock is late |
-//! | `uart` | USART1 | 4 | reads or writes a byte, turns the driver off at the end. At 921600 bit/s a byte is received every 12 us; if the task is later than that, a byte is lost, the receiver reports an overrun and the frame is discarded |
+//! | `uart` | LINE: USART1 or the board's UART | 4 | reads or writes a byte, turns the driver off at the end. At 921600 bit/s a byte is received every 12 us; if the task is later than that, a byte is lost, the receiver reports an overrun and the frame is discarded |
 //! | `gap` | TIM2 | 4 | handles t1.5 and t3.5. If late, a silence becomes longer, never shorter |
-//! | `radio_uart` | USART3 | 4 | moves a byte between the radio's UART and the queues. A byte is received every 1.04 ms; if the task is later than that, a byte is lost |
+//! | `radio_uart` | RADIO: USART3 or the board's UART | 4 | moves a byte between the radio's UART and the queues. A byte is received every 1.04 ms; if the task is later than that, a byte is lost |
 //! | `alarm` | TIM1_CC | 4 | takes the unit's turns in an arbitration. If late, a start bit is, which the windows allow for up to 8.5 us. Aborts a reply that does not end |
-//! | `serve` | EXTI3, pended by `gap`, `uart` and `radio` | 3 | serves a complete frame; executes a command when its response has been sent. If late, the response is late |
+//! | `serve` | SERVE: EXTI3 or the board's, pended by `gap`, `uart` and `radio` | 3 | serves a complete frame; executes a command when its response has been sent. If late, the response is late |
 //! | `scan` | EXTI1, pended by `beat` and by a write | 2 | copies inputs into the device and outputs to the modules, runs the time-outs. If late, it catches up |
 //! | `radio` | EXTI4, pended by `scan` while the radio is on | 2 | sets the radio up, receives frames and sends replies through the queues. If late, a silence becomes longer, never shorter |
 //! | `background` | EXTI0, pended every 10 ms and on commands | 1 | DAC transfers, configuration store, LEDs, log. Not urgent |
@@ -18,6 +18,8 @@
 //!
 //! `serve`, `scan`, `radio` and `background` act as software tasks, but each is bound to an interrupt that nothing else
 //! uses. docs/decisions.md says why.
+//!
+//! LINE, RADIO and SERVE are names in the board's row in crate register-map.
 
 #![no_std]
 #![no_main]
@@ -40,11 +42,11 @@ mod trap;
 mod updating;
 mod upkeep;
 
-#[rtic::app(device = board_support::pac, peripherals = true)]
+#[rtic::app(device = board_support::device, peripherals = true)]
 mod app {
     use core::mem::MaybeUninit;
 
-    use board_support::{RadioUart, ScanTimer, Watchdog, boards::SLOTS, kept, pac::Interrupt};
+    use board_support::{RadioUart, ScanTimer, Watchdog, boards::SLOTS, device::interrupt, kept};
     use firmware::alive::{self, Task};
     use heapless::spsc::{Consumer, Producer, Queue};
     use modbus_server::Adu;
@@ -141,7 +143,7 @@ mod app {
         }
     }
 
-    #[task(binds = USART1, priority = 4, shared = [line])]
+    #[task(binds = LINE, priority = 4, shared = [line])]
     fn uart(mut cx: uart::Context) {
         alive::begin(kept::marks(), Task::Uart);
         let waits = cx.shared.line.lock(|line| {
@@ -150,7 +152,7 @@ mod app {
         });
         if waits {
             // Also after a reply, because a command may have waited for its end.
-            rtic::pend(Interrupt::EXTI3);
+            rtic::pend(interrupt::SERVE);
         }
     }
 
@@ -162,7 +164,7 @@ mod app {
                 .is_some_and(|line| line.on_gap(clock::millis()))
         });
         if waits {
-            rtic::pend(Interrupt::EXTI3);
+            rtic::pend(interrupt::SERVE);
         }
     }
 
@@ -188,10 +190,10 @@ mod app {
                 .radio_uart
                 .lock(|uart| uart.as_mut().map(RadioUart::set_up));
         }
-        rtic::pend(Interrupt::EXTI1);
+        rtic::pend(interrupt::EXTI1);
     }
 
-    #[task(binds = USART3, priority = 4, shared = [radio_uart])]
+    #[task(binds = RADIO, priority = 4, shared = [radio_uart])]
     fn radio_uart(mut cx: radio_uart::Context) {
         alive::begin(kept::marks(), Task::RadioUart);
         cx.shared
@@ -200,7 +202,7 @@ mod app {
     }
 
     #[task(
-        binds = EXTI3,
+        binds = SERVE,
         priority = 3,
         local = [serving],
         shared = [line, radio, device],
@@ -225,7 +227,7 @@ mod app {
             .run(&mut shared.device, &mut shared.dacs, cx.local.events);
         alive::end(kept::marks(), Task::Scan);
         if beat && *cx.local.radio_is_on {
-            rtic::pend(Interrupt::EXTI4);
+            rtic::pend(interrupt::EXTI4);
         }
     }
 
@@ -235,7 +237,7 @@ mod app {
         let mut shared = cx.shared;
         let waits = cx.local.polling.run(&mut shared.radio, &mut shared.device);
         if waits {
-            rtic::pend(Interrupt::EXTI3);
+            rtic::pend(interrupt::SERVE);
         }
         alive::end(kept::marks(), Task::Radio);
     }

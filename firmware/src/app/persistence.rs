@@ -5,14 +5,13 @@
 
 use board_support::{Flash, flash::FlashError, kept};
 use firmware::{
-    config::Settings,
     device::Restart,
     store::{Operation, Saving, Store, WriteError},
 };
 use rtic::Mutex;
 
 use crate::{
-    board::{BOARD, Device},
+    board::{BOARD, Device, Settings},
     log::Event,
 };
 
@@ -89,7 +88,7 @@ impl Persistence {
     fn save(&mut self, device: &mut impl Mutex<T = &'static mut Device>) -> Option<Event> {
         // A copy, so that requests do not wait while the settings are encoded. They stay the same until the end of
         // the save.
-        let settings = device.lock(|device| device.config.to_save().clone());
+        let settings = device.lock(|device| *device.config.to_save());
         let mut saving = match self.saving.take() {
             Some(saving) => saving,
             None => {

@@ -10,7 +10,7 @@
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use board_support::{Damaged, IoPin, RadioUart, pac::Interrupt};
+use board_support::{Damaged, IoPin, RadioUart, device::interrupt};
 use embedded_hal_nb::serial::{ErrorKind, ErrorType, Read, Write};
 use firmware::{byte_queue::ByteQueue, radio};
 use rtic::Mutex;
@@ -65,7 +65,7 @@ impl Write<u8> for Serial {
         let pushed = TO_SEND.push(byte);
         // The handler takes bytes when the UART can send them. Also pended when the queue is full, in case the UART's
         // interrupt was turned off by a disturbed register.
-        rtic::pend(Interrupt::USART3);
+        rtic::pend(interrupt::RADIO);
         if pushed {
             Ok(())
         } else {
@@ -78,7 +78,7 @@ impl Write<u8> for Serial {
         if TO_SEND.is_empty() {
             Ok(())
         } else {
-            rtic::pend(Interrupt::USART3);
+            rtic::pend(interrupt::RADIO);
             Err(nb::Error::WouldBlock)
         }
     }

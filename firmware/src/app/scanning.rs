@@ -1,9 +1,10 @@
 //! A scan: copies inputs into the device and outputs to the modules, and runs the time-outs.
 
-use board_support::{Sampler, boards::SLOTS, kept, pac::Interrupt};
+use board_support::{Sampler, boards::SLOTS, device::interrupt, kept};
 use firmware::{alive, device::IoPort, leds::TICK_MS};
 use heapless::spsc::Producer;
 use modio_drivers::{Channels, DacLink, ModuleError};
+use register_map::links;
 use rtic::Mutex;
 
 use crate::{
@@ -127,6 +128,10 @@ impl Scanning {
                 }
             }
         });
+        if beat && links::exist(SLOTS) {
+            // Under a lock for each slot, because requests wait for it.
+            (0..SLOTS).for_each(|slot| device.lock(|device| device.run_links(slot)));
+        }
         if tripped {
             enqueue(events, Event::CommunicationLost);
         }
@@ -136,7 +141,7 @@ impl Scanning {
         }
         // Run the background immediately when outputs may have changed: they may be those of a DAC.
         if self.background_beat.is_due() || !beat || tripped {
-            rtic::pend(Interrupt::EXTI0);
+            rtic::pend(interrupt::EXTI0);
         }
         beat
     }
@@ -158,12 +163,12 @@ impl Scanning {
             // On a silent line nothing triggers these tasks. Without a cause they only set their marks. One after
             // another, because a byte waits for all interrupts that are pended together.
             let mut tasks = [
-                Interrupt::USART1,
-                Interrupt::TIM2,
-                Interrupt::TIM1_CC,
-                Interrupt::USART3,
-                Interrupt::EXTI3,
-                Interrupt::EXTI4,
+                interrupt::LINE,
+                interrupt::TIM2,
+                interrupt::TIM1_CC,
+                interrupt::RADIO,
+                interrupt::SERVE,
+                interrupt::EXTI4,
             ]
             .into_iter();
             self.asked = (self.asked + 1) % tasks.len();

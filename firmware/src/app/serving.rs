@@ -5,7 +5,7 @@
 //! device       ...serve...
 //! ```
 
-use board_support::pac::Interrupt;
+use board_support::device::interrupt;
 use firmware::{
     HAS_EVENTS,
     config::{LineName, Origin},
@@ -219,11 +219,11 @@ impl Served {
             device.end_request()
         });
         if writes {
-            rtic::pend(Interrupt::EXTI1);
+            rtic::pend(interrupt::EXTI1);
         }
         if self.order.is_some() {
             // Without a reply there is no end of a reply to wait for.
-            rtic::pend(Interrupt::EXTI3);
+            rtic::pend(interrupt::SERVE);
         }
     }
 
@@ -248,5 +248,5 @@ const fn restarts(order: Command) -> bool {
 #[inline(never)]
 fn execute(order: Command, line: LineName, device: &mut impl Mutex<T = &'static mut Device>) {
     device.lock(|device| device.carry_out(order, line));
-    rtic::pend(Interrupt::EXTI0);
+    rtic::pend(interrupt::EXTI0);
 }

@@ -225,6 +225,7 @@ pub fn up(
                 board.leds,
                 Trouble::at_start(address, board.clock.is_crystal()),
             ),
+            recovery: board.recovery,
             log,
             stack: LowWater::default(),
             radio: None,

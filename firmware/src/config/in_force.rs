@@ -33,7 +33,7 @@ impl LineConfig {
 
     /// Returns the settings of the line that a start with these settings puts in force.
     #[must_use]
-    pub fn of(settings: &Settings) -> Self {
+    pub fn of<const SLOTS: usize>(settings: &Settings<SLOTS>) -> Self {
         let get = |address| settings.get(address);
         Self {
             baud: u32::from(get(at::BAUD)) * 100,
@@ -58,7 +58,7 @@ impl RadioConfig {
     /// Returns the settings of the radio line that a start with these settings puts in force, or `None` when the
     /// radio is off.
     #[must_use]
-    pub fn of(settings: &Settings) -> Option<Self> {
+    pub fn of<const SLOTS: usize>(settings: &Settings<SLOTS>) -> Option<Self> {
         let get = |address| settings.get(address);
         // The values are in the ranges of the register map, which fit a byte.
         let byte = |address| get(address).to_le_bytes()[0];
@@ -89,7 +89,7 @@ pub struct Point {
 
 impl Point {
     /// Returns the settings of a point, 0 to 31.
-    pub(super) fn of(settings: &Settings, point: u16) -> Self {
+    pub(super) fn of<const SLOTS: usize>(settings: &Settings<SLOTS>, point: u16) -> Self {
         let get = |first: u16| settings.get(first.wrapping_add(point));
         Self {
             settings: ChannelSettings {

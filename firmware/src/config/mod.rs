@@ -1,4 +1,4 @@
-//! The configuration, registers 0x0100 to 0x01FF: which writes are allowed, the edited settings, the stored
+//! The configuration, registers 0x0100 to 0x01FF, and the links, 0x0400 to 0x04FF: which writes are allowed, the edited settings, the stored
 //! settings and the settings in force.
 //!
 //! A setting has three values:
@@ -18,6 +18,7 @@
 //! opened, a broadcast over the air writes nothing here, and the radio may be set to write nothing here at all.
 
 mod in_force;
+mod links;
 mod lock;
 mod origin;
 mod saves;
@@ -31,20 +32,22 @@ use core::array;
 use modbus_server::{Exception, Span, Words, WordsOut};
 use register_map::codes::{CommSource, Command, Lora};
 use register_map::configuration::{
-    COMM_SOURCE, COMM_TIMEOUT, COMMAND, FILTER, FORMAT, KEY, LORA, MODE, MODULE, RESPONSE_DELAY,
-    RULES, SAVES, SERIAL_LOW,
+    COMM_SOURCE, COMM_TIMEOUT, COMMAND, FILTER, FORMAT, KEY, LORA, LORA_FRAME_GAP, MODE, MODULE,
+    RANGE, RESPONSE_DELAY, RULES, SAVES, SERIAL_LOW, UNIT,
 };
 use register_map::points;
 use register_map::state::status;
-use register_map::{Board, Module, Run, runs};
+use register_map::{Board, Module, Run, Runs, links as links_map, runs};
 
+use crate::HAS_SLOTS;
 pub use in_force::{LineConfig, Point, RadioConfig};
+use links::Links;
 use lock::Lock;
 pub use origin::{LineName, Origin};
 use saves::Saves;
 pub use settings::RestartValues;
-pub use settings::Settings;
-use settings::{RESTARTS, format_suits_mode, takes_module};
+use settings::{RESTARTS, format_suits_mode, port_of, takes_module};
+pub use settings::{Settings, kinds};
 
 /// How far a save is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,9 +64,9 @@ enum Save {
 #[derive(Debug)]
 pub struct Config<const SLOTS: usize> {
     board: &'static Board,
-    edited: Settings,
+    edited: Settings<SLOTS>,
     /// The stored settings, or those being stored.
-    saved: Settings,
+    saved: Settings<SLOTS>,
     /// Number of settings in `edited` that differ from `saved`.
     differences: u16,
     save: Save,
@@ -94,7 +97,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
     /// settings were damaged, or that some were rejected, and defaults are used instead.
     #[must_use]
     #[inline(never)]
-    pub fn new(board: &'static Board, stored: Settings, invalid: bool) -> Self {
+    pub fn new(board: &'static Board, stored: Settings<SLOTS>, invalid: bool) -> Self {
         let mut started = [0; RESTARTS];
         for (place, value) in started.iter_mut().zip(stored.restart_values()) {
             *place = value;
@@ -105,7 +108,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
             modules: array::from_fn(|slot| {
                 stored.module(board.first_port.wrapping_add(slot as u16))
             }),
-            edited: stored.clone(),
+            edited: stored,
             saved: stored,
             differences: 0,
             save: Save::None,
@@ -173,16 +176,35 @@ impl<const SLOTS: usize> Config<SLOTS> {
     ///
     /// # Errors
     ///
-    /// Exception 02 when the span contains a gap.
+    /// Exception 02 when the span contains a gap, or a register that the board does not have.
     pub fn check_read(&self, span: Span) -> Result<(), Exception> {
         match runs(RULES, span.start(), span.count()) {
-            Some(_) => Ok(()),
-            None => Err(Exception::IllegalDataAddress),
+            _ if Links::<SLOTS>::contain(span.start()) => self.check_links(span),
+            Some(_) if self.has(span) => Ok(()),
+            _ => Err(Exception::IllegalDataAddress),
         }
+    }
+
+    /// Returns whether the board has these registers, which are not in a gap.
+    fn has(&self, span: Span) -> bool {
+        let has = |first: u16, last: u16| u32::from(first) < span.end() && span.start() <= last;
+        let lacks_unit = HAS_SLOTS || self.board.switch;
+        let has_radio = HAS_SLOTS || self.board.radio;
+        !(lacks_unit && has(UNIT, UNIT)) && (has_radio || !has(LORA, LORA_FRAME_GAP))
+    }
+
+    /// Returns whether the board has these registers, and lets them be written.
+    fn lets_write(&self, span: Span) -> bool {
+        let fixed = |address| port_of(address).is_some_and(|port| !self.board.chooses(port));
+        self.has(span) && (HAS_SLOTS || !span.addresses().any(fixed))
     }
 
     /// Appends every register of a span that [`Self::check_read`] has accepted.
     pub fn read(&self, span: Span, out: &mut WordsOut<'_>) {
+        if Links::<SLOTS>::contain(span.start()) {
+            let addresses = span.addresses();
+            return addresses.for_each(|address| out.push(self.edited.get(address)));
+        }
         let mut values = self.edited.slice(span.start(), span.count()).iter();
         if span.start() == KEY {
             values.next();
@@ -195,22 +217,21 @@ impl<const SLOTS: usize> Config<SLOTS> {
     ///
     /// # Errors
     ///
-    /// The first that applies: 02 for a gap; 03 for a value that is not allowed, including a setting by point that
+    /// The first that applies: 02 for a gap, or for a MODULE that is part of the board; 03 for a value that is not allowed, including a setting by point that
     /// the module chosen last does not allow, and a FORMAT with seven data bits in RTU mode; 06 for a broadcast over
     /// the air or a line that may not write here, when the lock is closed for the line and the request does not write
     /// KEY alone, or when a save is ordered before the previous one is complete or with nothing left of the budget.
     pub fn check_write(&self, span: Span, words: Words<'_>) -> Result<(), Exception> {
-        let runs = runs(RULES, span.start(), span.count());
-        let runs = runs.ok_or(Exception::IllegalDataAddress)?;
-        let mut values = words;
-        for run in runs {
-            let of_run = values.slice(0, run.count);
-            values = values.slice(run.count, u16::MAX);
-            if !run.rule.values.allow_all(of_run.iter()) || !self.suits_the_ports(run, of_run) {
-                return Err(Exception::IllegalDataValue);
-            }
-        }
-        if !self.suits_the_mode(span, words) {
+        let suits = if Links::<SLOTS>::contain(span.start()) {
+            self.check_links(span)?;
+            self.suits_the_links(span, words)
+        } else {
+            let runs = runs(RULES, span.start(), span.count());
+            let runs = runs.filter(|_| self.lets_write(span));
+            let runs = runs.ok_or(Exception::IllegalDataAddress)?;
+            self.suit(runs, words) && self.suits_the_mode(span, words)
+        };
+        if !suits {
             return Err(Exception::IllegalDataValue);
         }
         self.check_line()?;
@@ -222,6 +243,18 @@ impl<const SLOTS: usize> Config<SLOTS> {
             return Err(Exception::ServerDeviceBusy);
         }
         Ok(())
+    }
+
+    /// Returns whether the registers of these runs allow the values.
+    fn suit(&self, runs: Runs, mut values: Words<'_>) -> bool {
+        for run in runs {
+            let of_run = values.slice(0, run.count);
+            values = values.slice(run.count, u16::MAX);
+            if !run.rule.values.allow_all(of_run.iter()) || !self.suits_the_ports(run, of_run) {
+                return false;
+            }
+        }
+        true
     }
 
     /// Returns whether a save is possible after a write of these values: there is one left, or the save would write
@@ -249,6 +282,13 @@ impl<const SLOTS: usize> Config<SLOTS> {
                 .zip(words.iter())
                 .all(|(index, code)| takes_module(self.board, index.wrapping_add(1), code));
         }
+        if !HAS_SLOTS && run.rule.first == RANGE {
+            let addresses = RANGE.wrapping_add(run.index)..;
+            let mut ranges = addresses.zip(words.iter());
+            if !ranges.all(|(address, range)| self.edited.takes_range(address, range)) {
+                return false;
+            }
+        }
         let Some(narrower) = run.rule.narrower else {
             return true;
         };
@@ -258,7 +298,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
             if first >= run.index.wrapping_add(run.count) {
                 return true;
             }
-            let kinds = self.edited.module(port).points();
+            let kinds = kinds(self.board, port, self.edited.module(port));
             (first..).zip(kinds).all(|(point, kind)| {
                 kind != narrower.kind
                     || words
@@ -291,7 +331,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
     pub fn write(&mut self, span: Span, words: Words<'_>) -> Option<Command> {
         self.lock.open(self.origin.line);
         let mut command = None;
-        if span.start() >= FILTER {
+        if (FILTER..links_map::LINKS).contains(&span.start()) {
             // These registers do not affect others.
             let edited = self.edited.slice_mut(span.start(), span.count());
             for (edited, value) in edited.iter_mut().zip(words.iter()) {
@@ -329,13 +369,13 @@ impl<const SLOTS: usize> Config<SLOTS> {
 
     /// COMMAND 3: sets every setting to its default. These values are not stored in flash.
     pub fn load_defaults(&mut self) {
-        self.edited = Settings::defaults();
+        self.edited = Settings::defaults(self.board);
         self.revision = self.revision.wrapping_add(1);
     }
 
     /// COMMAND 4: sets every setting to its saved value.
     pub fn drop_changes(&mut self) {
-        self.edited.clone_from(&self.saved);
+        self.edited = self.saved;
         self.left = 0;
         self.revision = self.revision.wrapping_add(1);
     }
@@ -344,13 +384,13 @@ impl<const SLOTS: usize> Config<SLOTS> {
     /// returns the copy until [`Self::end_save`] or [`Self::save_failed`].
     pub fn begin_save(&mut self) {
         self.save = Save::Begun;
-        self.saved.clone_from(&self.edited);
+        self.saved = self.edited;
         self.differences = 0;
     }
 
     /// Returns the settings that [`Self::begin_save`] copied.
     #[must_use]
-    pub const fn to_save(&self) -> &Settings {
+    pub const fn to_save(&self) -> &Settings<SLOTS> {
         &self.saved
     }
 
@@ -369,7 +409,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
     }
 
     /// Ends a save that failed. `stored` is what the flash still holds.
-    pub fn save_failed(&mut self, stored: Settings) {
+    pub fn save_failed(&mut self, stored: Settings<SLOTS>) {
         self.saved = stored;
         self.differences = self.edited.differences(&self.saved);
         self.save = Save::None;
@@ -446,14 +486,19 @@ impl<const SLOTS: usize> Config<SLOTS> {
         &self.modules
     }
 
+    /// Returns whether MODULE of a port has not been changed since the start. `index` counts the ports with a slot.
+    const fn is_in_force(&self, index: usize) -> bool {
+        self.left >> (index & 7) & 1 == 0
+    }
+
     /// Returns the settings in force of a point. `index` counts the ports with a slot. Returns `None` from a change of
     /// the port's MODULE until the restart, even when the change was reverted: the change has reset the settings by
     /// point to the new module's defaults, so the running module keeps the settings that were returned last.
     #[must_use]
     pub fn point(&self, index: usize, channel: usize) -> Option<Point> {
         let first = points::of_port(self.board.first_port.wrapping_add(index as u16));
-        let in_force = self.left >> (index & 7) & 1 == 0;
-        in_force.then(|| Point::of(&self.edited, first.wrapping_add(channel as u16)))
+        self.is_in_force(index)
+            .then(|| Point::of(&self.edited, first.wrapping_add(channel as u16)))
     }
 
     /// Returns SERIAL_LOW.

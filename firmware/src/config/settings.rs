@@ -1,9 +1,15 @@
 //! The value of every setting.
 
+use modio_drivers::CHANNELS;
 use register_map::codes::{Format, Mode};
-use register_map::configuration::{self, COMMAND, FORMAT, KEY, MODE, MODULE, RULES};
+use register_map::configuration::{
+    self, COMMAND, FORMAT, KEY, MODE, MODULE, RANGE, RULES, module_of,
+};
 use register_map::points::{self, Kind};
-use register_map::{Board, InForce, Module, Rule, rule_at};
+use register_map::{Board, InForce, Module, Rule, links, rule_at};
+
+use super::links::Links;
+use crate::HAS_SLOTS;
 
 /// High byte of every configuration address. The low byte is the index in [`Settings`].
 const PAGE: u16 = KEY >> 8;
@@ -15,21 +21,36 @@ pub(super) const RESTARTS: usize = restarts();
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RestartValues(pub(super) [u16; RESTARTS]);
 
-/// A value for every register of the configuration. The values are consistent: a setting by point is always one
-/// that the point's module allows.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Settings {
+/// A value for every register of the configuration, and the links of the points in `SLOTS` slots. The values are
+/// consistent: a setting by point is always one that the point's module allows, and so is a link.
+// `Copy`, because copies of its parts one after another take more flash. Aligned, so that it is copied by words: requests
+// wait for the copy.
+#[repr(align(4))]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings<const SLOTS: usize> {
     /// Indexed by the low byte of the address. KEY, COMMAND and gaps hold 0.
     values: [u16; 256],
+    board: &'static Board,
+    pub(super) links: Links<SLOTS>,
 }
 
-impl Settings {
-    /// Returns the factory settings.
+impl<const SLOTS: usize> Settings<SLOTS> {
+    /// Returns the factory settings of a board.
     #[must_use]
-    pub fn defaults() -> Self {
-        let mut settings = Self { values: [0; 256] };
+    pub fn defaults(board: &'static Board) -> Self {
+        let mut settings = Self {
+            values: [0; 256],
+            board,
+            links: Links::new(board.points().start),
+        };
         for (rule, address) in Addresses::from(KEY) {
             settings.put(address, rule.default);
+        }
+        if !HAS_SLOTS {
+            for (port, fixed) in board.ports().zip(board.fixed) {
+                settings.put(module_of(port), fixed.module.code());
+                settings.set_ranges(port);
+            }
         }
         settings
     }
@@ -37,18 +58,23 @@ impl Settings {
     /// Returns the settings from a record's pairs of address and value, in ascending order, and the number of values that
     /// this board does not allow and that have their default instead. Unknown addresses are ignored.
     #[must_use]
-    pub fn load(board: &Board, pairs: impl Iterator<Item = (u16, u16)>) -> (Self, u16) {
-        let mut settings = Self::defaults();
+    pub fn load(board: &'static Board, pairs: impl Iterator<Item = (u16, u16)>) -> (Self, u16) {
+        let mut settings = Self::defaults(board);
         let mut rejected: u16 = 0;
         // Pairs are in ascending order. So the modules, which determine which settings by point are allowed, come before
         // these.
         for (address, value) in pairs {
-            let Some((rule, _)) = rule_at(RULES, address).filter(|(rule, _)| holds(rule)) else {
-                continue;
+            let rule = rule_at(RULES, address).filter(|(rule, _)| holds(rule));
+            let allowed = match rule {
+                Some((rule, _)) => {
+                    let port = port_of(address);
+                    rule.values_for(settings.kind_at(address)).allow(value)
+                        && port.is_none_or(|port| takes_module(board, port, value))
+                        && settings.takes_range(address, value)
+                }
+                None if Links::<SLOTS>::contain(address) => settings.has_link(address),
+                None => continue,
             };
-            let port = port_of(address);
-            let allowed = rule.values_for(settings.kind_at(address)).allow(value)
-                && port.is_none_or(|port| takes_module(board, port, value));
             if allowed {
                 settings.set(address, value);
             } else {
@@ -60,6 +86,7 @@ impl Settings {
             settings.put(FORMAT, Format::F8N2.code());
             rejected = rejected.saturating_add(1);
         }
+        let rejected = rejected.saturating_add(settings.drop_links(None));
         (settings, rejected)
     }
 
@@ -70,7 +97,7 @@ impl Settings {
         let [page, place] = address.to_be_bytes();
         match self.values.get(usize::from(place)) {
             Some(value) if u16::from(page) == PAGE => *value,
-            _ => 0,
+            _ => self.links.at(address).map_or(0, |link| link.word(address)),
         }
     }
 
@@ -84,24 +111,28 @@ impl Settings {
     /// Returns the module chosen for a port, 1 to 8.
     #[must_use]
     pub fn module(&self, port: u16) -> Module {
-        let address = MODULE.wrapping_add(port.wrapping_sub(1));
-        Module::from_code(self.get(address)).unwrap_or(Module::None)
+        Module::from_code(self.get(module_of(port))).unwrap_or(Module::None)
     }
 
-    /// Returns the kind of a point, 0 to 31, with the chosen module.
+    /// Returns the kind of a point with the chosen module; none above 31.
     #[must_use]
     pub fn kind(&self, point: u16) -> Kind {
-        let kinds = self.module(point / points::CHANNELS + 1).points();
+        if point >= points::COUNT {
+            return Kind::None;
+        }
+        let port = point / points::CHANNELS + 1;
+        let kinds = kinds(self.board, port, self.module(port));
         let channel = usize::from(point % points::CHANNELS);
         kinds.get(channel).copied().unwrap_or(Kind::None)
     }
 
     /// Returns every setting from this address on that differs from its default, in ascending order.
     #[must_use]
-    pub const fn changed_from(&self, first: u16) -> Changed<'_> {
+    pub fn changed_from(&self, first: u16) -> Changed<'_, SLOTS> {
         Changed {
             settings: self,
             held: Addresses::from(first),
+            links: first.max(links::LINKS),
         }
     }
 
@@ -131,9 +162,7 @@ impl Settings {
 
     /// Returns the number of settings that differ from those of `from`.
     pub(super) fn differences(&self, from: &Self) -> u16 {
-        let pairs = self.values.iter().zip(&from.values);
-        // There are at most 256.
-        pairs.map(|(a, b)| u16::from(a != b)).sum()
+        differences(&self.values, &from.values).wrapping_add(self.links.differences(&from.links))
     }
 
     /// Returns whether a setting that needs a restart differs from its value in force since the start.
@@ -164,7 +193,7 @@ impl Settings {
         if after == before {
             return;
         }
-        self.put(MODULE.wrapping_add(port.wrapping_sub(1)), code);
+        self.put(module_of(port), code);
         // The settings by point, see `point_of`.
         let rules = RULES.iter().filter(|rule| rule.count == points::COUNT);
         for rule in rules {
@@ -180,14 +209,50 @@ impl Settings {
                 }
             }
         }
+        if !HAS_SLOTS {
+            self.set_ranges(port);
+        }
+        self.drop_links(Some(self.links.slot_of(first)));
+    }
+
+    /// Sets RANGE of the points of a port of the board to the only value that each takes.
+    fn set_ranges(&mut self, port: u16) {
+        for point in (points::of_port(port)..).take(CHANNELS) {
+            if let Some(range) = self.only_range(point) {
+                self.put(RANGE.wrapping_add(point), range);
+            }
+        }
+    }
+
+    /// Returns the only value of RANGE of an analog point that is part of the board.
+    fn only_range(&self, point: u16) -> Option<u16> {
+        let fixed = self.board.fixed(point / points::CHANNELS + 1)?;
+        let kind = self.kind(point);
+        matches!(kind, Kind::WordInput | Kind::WordOutput)
+            .then(|| fixed.range(point % points::CHANNELS, kind))
+    }
+
+    /// Returns whether the board allows a value, if it is one of RANGE.
+    pub(super) fn takes_range(&self, address: u16, value: u16) -> bool {
+        let point = address.wrapping_sub(RANGE);
+        HAS_SLOTS
+            || point >= points::COUNT
+            || self.only_range(point).is_none_or(|only| value == only)
     }
 
     fn put(&mut self, address: u16, value: u16) {
-        let [_, place] = address.to_be_bytes();
-        if let Some(held) = self.values.get_mut(usize::from(place)) {
+        let [page, place] = address.to_be_bytes();
+        if Links::<SLOTS>::EXIST && u16::from(page) != PAGE {
+            self.links.set(address, value);
+        } else if let Some(held) = self.values.get_mut(usize::from(place)) {
             *held = value;
         }
     }
+}
+
+/// Returns the number of words that differ. There are at most 256.
+pub(super) fn differences(a: &[u16], b: &[u16]) -> u16 {
+    a.iter().zip(b).map(|(a, b)| u16::from(a != b)).sum()
 }
 
 /// Returns whether a value of FORMAT is compatible with a value of MODE.
@@ -198,9 +263,22 @@ pub(super) fn format_suits_mode(format: u16, mode: u16) -> bool {
     }
 }
 
-/// Returns whether a port's MODULE may have this value. A port without a slot has no module.
-pub(super) const fn takes_module(board: &Board, port: u16, code: u16) -> bool {
-    code == 0 || board.has_slot(port)
+/// Returns whether a port's MODULE may have this value. A port without points has no module.
+pub(super) fn takes_module(board: &Board, port: u16, code: u16) -> bool {
+    if HAS_SLOTS {
+        code == 0 || board.has_slot(port)
+    } else {
+        board.takes(port, code)
+    }
+}
+
+/// Returns the kinds of the points of a port with this module.
+pub fn kinds(board: &Board, port: u16, module: Module) -> [Kind; CHANNELS] {
+    if HAS_SLOTS {
+        module.points()
+    } else {
+        board.kinds(port, module)
+    }
 }
 
 /// Returns the port, 1 to 8, whose MODULE is at this address.
@@ -248,18 +326,19 @@ impl Iterator for Addresses {
 }
 
 /// Iterates over the settings that differ from their defaults, see [`Settings::changed_from`].
-pub struct Changed<'a> {
-    settings: &'a Settings,
+pub struct Changed<'a, const SLOTS: usize> {
+    settings: &'a Settings<SLOTS>,
     held: Addresses,
+    /// The register of a link that is next, after all others.
+    links: u16,
 }
 
-impl Iterator for Changed<'_> {
+impl<const SLOTS: usize> Iterator for Changed<'_, SLOTS> {
     type Item = (u16, u16);
 
     #[inline(never)]
     fn next(&mut self) -> Option<(u16, u16)> {
-        loop {
-            let (rule, address) = self.held.next()?;
+        for (rule, address) in self.held.by_ref() {
             let value = self.settings.get(address);
             let default = match rule.narrower {
                 Some(_) => rule.default_for(self.settings.kind_at(address)),
@@ -269,6 +348,14 @@ impl Iterator for Changed<'_> {
                 return Some((address, value));
             }
         }
+        while Links::<SLOTS>::contain(self.links) {
+            let address = self.links;
+            self.links = address.wrapping_add(1);
+            if let Some(value) = self.settings.links.changed(address) {
+                return Some((address, value));
+            }
+        }
+        None
     }
 }
 

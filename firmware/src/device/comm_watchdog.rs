@@ -54,6 +54,12 @@ impl CommWatchdog {
         true
     }
 
+    /// Returns whether the silence has reached the time-out and still lasts.
+    #[must_use]
+    pub const fn has_expired(&self) -> bool {
+        self.safe
+    }
+
     /// Returns whether the watchdog has tripped since the start or the last [`clear`](Self::clear).
     #[must_use]
     pub const fn has_tripped(&self) -> bool {
@@ -82,7 +88,9 @@ mod tests {
         let mut watchdog = CommWatchdog::new();
         assert_eq!(trips_at(&mut watchdog, 0, 100), 100);
         assert!((101..1000).all(|now| !watchdog.check(now, Some(100))));
+        assert!(watchdog.has_expired());
         watchdog.refresh(1000);
+        assert!(!watchdog.has_expired());
         assert!(watchdog.has_tripped(), "a request does not clear the flag");
         assert_eq!(trips_at(&mut watchdog, 1000, 100), 1100);
         watchdog.clear();

@@ -39,6 +39,8 @@ impl EdgeLog {
 
     /// Adds an edge of a point to this level at a time, which is not 0. `debounce_ms`: the time for which the input has had
     /// the new level.
+    // Not inlined, which takes 32 bytes less.
+    #[inline(never)]
     pub fn add(&mut self, point: u16, level: bool, ms: u32, debounce_ms: u16) {
         // The first of the samples with the new level may be that of the late scan.
         let window = u32::from(debounce_ms.max(1));

@@ -59,7 +59,7 @@ mod tests {
 
     #[test]
     fn the_product_code_is_that_of_the_registers() {
-        let config = Config::<1>::new(&MODIO_02, Settings::defaults(), false);
+        let config = Config::<1>::new(&MODIO_02, Settings::defaults(&MODIO_02), false);
         let code = std::format!("{:08X}", register_map::state::PRODUCT);
         assert_eq!(object(1, &[0; 24], &config), Some(code.as_bytes()));
         assert_eq!(object(4, &[0; 24], &config), Some(&b"modio-02"[..]));
@@ -67,7 +67,7 @@ mod tests {
 
     #[test]
     fn the_serial_number_is_the_unique_identity() {
-        let config = Config::<1>::new(&MODIO_02, Settings::defaults(), false);
+        let config = Config::<1>::new(&MODIO_02, Settings::defaults(&MODIO_02), false);
         let serial = serial([0x0123, 0x4567, 0x89AB, 0xCDEF, 0x0000, 0xFFFF]);
         assert_eq!(&serial, b"0123456789ABCDEF0000FFFF");
         assert_eq!(object(0x80, &serial, &config), Some(&serial[..]));

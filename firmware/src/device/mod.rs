@@ -20,6 +20,7 @@ mod description;
 mod edge_log;
 mod events;
 mod identification;
+mod linking;
 mod points;
 mod port;
 mod state;
@@ -63,6 +64,12 @@ pub struct Device<const SLOTS: usize> {
     description: Description,
     comm_watchdog: CommWatchdog,
     edges: EdgeLog,
+    /// The levels of the sources of the links of each slot, one bit for each link.
+    levels: [u8; SLOTS],
+    /// There is a link with a source.
+    has_links: bool,
+    /// Slots whose levels are those of a scan, one bit for each. From then on a change is an edge.
+    linked: u8,
     events: Events<SLOTS>,
     /// A command from a request, to be executed when its reply has been sent.
     ordered: Option<Command>,
@@ -92,14 +99,20 @@ pub enum Restart {
 /// The block of the address space that contains the start of a span. The span must not leave the block.
 enum Block {
     Points,
-    Name,
     Config,
-    State,
-    Fault,
-    Radio,
     Pulses,
-    Edges,
+    /// Name of the board, state, fault record, counters of the radio, last edges.
+    ReadOnly,
 }
+
+/// The registers of [`Block::ReadOnly`]. A span lies within one of these ranges.
+const READ_ONLY: [&[Range<u16>]; 5] = [
+    name::SPANS,
+    state_map::SPANS,
+    fault::SPANS,
+    radio::SPANS,
+    edges::SPANS,
+];
 
 impl Block {
     #[inline(always)]
@@ -115,13 +128,9 @@ impl Block {
     #[inline(never)]
     const fn of_others(span: Span) -> Self {
         match span.start().to_be_bytes() {
-            [0, _] => Self::Name,
-            [1, _] => Self::Config,
-            [2, 0x00..=0x5F] => Self::State,
-            [2, 0x60..=0x6F] => Self::Fault,
-            [2, _] => Self::Radio,
-            [3, 0x00..=0x7F] => Self::Pulses,
-            [3, _] => Self::Edges,
+            [1 | 4, _] => Self::Config,
+            [0 | 2, _] | [3, 0x80..=0xFF] => Self::ReadOnly,
+            [3, _] => Self::Pulses,
             _ => Self::Points,
         }
     }
@@ -139,11 +148,14 @@ impl<const SLOTS: usize> Device<SLOTS> {
         description: &'static Fixed,
     ) -> &'a mut Self {
         let device = place.write(Self {
-            points: Points::new(config.board().points().start, config.modules()),
+            points: Points::new(&config),
             state: State::new(config.board(), identity),
             description: Description::new(description, &config),
             comm_watchdog: CommWatchdog::new(),
             edges: EdgeLog::new(),
+            levels: [0; SLOTS],
+            has_links: false,
+            linked: 0,
             events: Events::new(),
             ordered: None,
             restart: None,
@@ -164,6 +176,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
         self.config.compare();
         self.revision = self.config.revision();
         self.for_each_point(IoPort::configure);
+        self.settle_links();
     }
 
     /// Passes the settings in force of every point to `act`, with the point's port and channel.
@@ -196,7 +209,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
 
     /// Stores the inputs that a scan of a slot has read. `words` is false when the settings have changed since the scan
     /// began: then the words of the scan have the wrong unit. `late`: the scan before this one was some milliseconds ago,
-    /// because flash was erased.
+    /// because flash was erased. Call [`Self::run_links`] for all slots after the last.
     // Not inlined into the scan, whose frame is large.
     #[inline(never)]
     pub fn scanned(&mut self, slot: usize, channels: &Channels, words: bool, late: bool) {
@@ -344,10 +357,14 @@ impl<const SLOTS: usize> Device<SLOTS> {
             )
     }
 
+    /// Returns a register of [`Block::ReadOnly`] or of the pulse counters.
     // Not inlined into the loop over the registers, which has few registers of the core left.
     #[inline(never)]
-    fn state_word(&self, address: u16) -> u16 {
+    fn read_only_word(&self, address: u16) -> u16 {
         match address {
+            ..state_map::PRODUCT_CODE => self.name_word(address),
+            counters::PULSES.. => self.points.input_word(address),
+            fault::KIND..radio::BUS_MESSAGES => self.state.fault_word(address),
             state_map::STATUS => self.status(),
             state_map::UPDATE => self.update.as_ref().map_or(0, Update::register),
             state_map::DESCRIPTION_CRC => self.description.crc(),
@@ -361,11 +378,11 @@ const fn is_of_update(command: &Command) -> bool {
     command.code() >= Command::Prepare.code()
 }
 
-/// Checks whether a span lies in a block of read-only registers and contains no gap.
-fn check_exists(block: &[Range<u16>], span: Span) -> Result<(), Exception> {
+/// Checks whether a span lies in one of these ranges of registers.
+fn check_exists(blocks: &[&[Range<u16>]], span: Span) -> Result<(), Exception> {
     let within =
         |range: &Range<u16>| range.contains(&span.start()) && span.end() <= u32::from(range.end);
-    if block.iter().any(within) {
+    if blocks.iter().any(|block| block.iter().any(within)) {
         Ok(())
     } else {
         Err(Exception::IllegalDataAddress)
@@ -382,12 +399,8 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
         match Block::of(span) {
             Block::Points => self.points.check_read_words(span),
             Block::Config => self.config.check_read(span),
-            Block::Name => check_exists(name::SPANS, span),
-            Block::State => check_exists(state_map::SPANS, span),
-            Block::Fault => check_exists(fault::SPANS, span),
-            Block::Radio => check_exists(radio::SPANS, span),
-            Block::Pulses => check_exists(counters::SPANS, span),
-            Block::Edges => check_exists(edges::SPANS, span),
+            Block::Pulses => check_exists(&[counters::SPANS], span),
+            Block::ReadOnly => check_exists(&READ_ONLY, span),
         }
     }
 
@@ -406,11 +419,9 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
                 }
                 checked
             }
-            Block::Name | Block::State | Block::Fault | Block::Radio | Block::Edges => {
-                Err(Exception::IllegalDataAddress)
-            }
+            Block::ReadOnly => Err(Exception::IllegalDataAddress),
             Block::Pulses => {
-                check_exists(counters::SPANS, span)?;
+                check_exists(&[counters::SPANS], span)?;
                 points::check_clear(span, words)?;
                 self.config.check_line()
             }
@@ -436,14 +447,9 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
         match Block::of(span) {
             Block::Points => self.points.read_words(span, out),
             Block::Config => self.config.read(span, out),
-            block => span.addresses().for_each(|address| {
-                out.push(match block {
-                    Block::Name => self.name_word(address),
-                    Block::Fault => self.state.fault_word(address),
-                    Block::Pulses | Block::Edges => self.points.input_word(address),
-                    _ => self.state_word(address),
-                });
-            }),
+            Block::Pulses | Block::ReadOnly => span
+                .addresses()
+                .for_each(|address| out.push(self.read_only_word(address))),
         }
     }
 
@@ -458,8 +464,8 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
                 self.ordered = self.config.write(span, words);
             }
             Block::Pulses => self.points.clear_pulses(span),
-            // `check_write_words` rejects writes to these blocks.
-            Block::Name | Block::State | Block::Fault | Block::Radio | Block::Edges => {}
+            // `check_write_words` rejects writes to these registers.
+            Block::ReadOnly => {}
         }
     }
 
@@ -482,15 +488,14 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
     }
 
     fn read_file(&self, file: u16, records: Span, out: &mut WordsOut<'_>) {
-        if file == status::FILE
-            && let Some(update) = &self.update
-        {
-            let records = records.addresses();
-            return records.for_each(|record| out.push(update.record(record)));
-        }
-        if file == edges::log::FILE {
-            let records = records.addresses();
-            return records.for_each(|record| out.push(self.edges.record(record)));
+        let update = self.update.as_ref().filter(|_| file == status::FILE);
+        if file == edges::log::FILE || update.is_some() {
+            return records.addresses().for_each(|record| {
+                out.push(
+                    update
+                        .map_or_else(|| self.edges.record(record), |update| update.record(record)),
+                );
+            });
         }
         self.description.read(&self.config, records, out);
     }

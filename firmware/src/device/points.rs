@@ -4,9 +4,10 @@ use core::ops::Range;
 
 use modbus_server::{Bits, BitsOut, Exception, Span, Words, WordsOut};
 use modio_drivers::{CHANNELS, ChannelStatus, Kind};
-use register_map::{Module, counters, edges, limits, points};
+use register_map::{counters, edges, limits, points};
 
 use super::port::IoPort;
+use crate::config::{Config, kinds};
 
 /// The points of the board's slots. Their port numbers are consecutive.
 #[derive(Debug)]
@@ -17,12 +18,16 @@ pub struct Points<const SLOTS: usize> {
 }
 
 impl<const SLOTS: usize> Points<SLOTS> {
-    /// Creates points of these kinds by port, from an address on, with every value 0.
+    /// Creates the points of the modules in force, with every value 0.
     #[must_use]
-    pub fn new(first: u16, modules: &[Module; SLOTS]) -> Self {
+    pub fn new(config: &Config<SLOTS>) -> Self {
+        let mut ports = config.board().ports();
         Self {
-            first,
-            ports: modules.map(|module| IoPort::new(module.points())),
+            first: config.board().points().start,
+            ports: config.modules().map(|module| {
+                let port = ports.next().unwrap_or_default();
+                IoPort::new(kinds(config.board(), port, module))
+            }),
         }
     }
 
@@ -80,6 +85,11 @@ impl<const SLOTS: usize> Points<SLOTS> {
     #[inline(always)]
     fn place_mut(&mut self, index: usize) -> Option<(&mut IoPort, usize)> {
         Some((self.ports.get_mut(index / CHANNELS)?, index % CHANNELS))
+    }
+
+    /// Returns the port and the channel of a point.
+    pub(super) fn place_of(&self, point: u16) -> Option<(&IoPort, usize)> {
+        self.place(self.index(point))
     }
 
     /// Returns the status of a point, 0 to 31: good for a point that does not exist.
@@ -186,7 +196,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
     pub fn write_bits(&mut self, span: Span, bits: Bits<'_>) {
         for (index, bit) in self.indices(span).zip(bits.iter()) {
             if let Some((port, channel)) = self.place_mut(index) {
-                port.channels.set_bit(channel, bit);
+                port.set_output(channel, bit);
             }
         }
     }

@@ -5,6 +5,7 @@ use register_map::codes::ModuleState;
 use register_map::limits;
 
 use crate::config::Point;
+use crate::links::Act;
 
 /// The points of one port.
 #[derive(Debug)]
@@ -18,6 +19,8 @@ pub struct IoPort {
     pulses: [u32; CHANNELS],
     /// Uptime of the last edge of each digital input in ms; 0 without one.
     edges: [u32; CHANNELS],
+    /// Uptime in ms at which a pulse of each digital output ends; 0 without a pulse.
+    pulse_ends: [u32; CHANNELS],
     /// The inputs have been scanned once. From then on a rising edge counts.
     scanned: bool,
     /// Channels that cannot be read or driven, channel 1 in bit 0.
@@ -35,6 +38,7 @@ impl IoPort {
             safe: [None; CHANNELS],
             pulses: [0; CHANNELS],
             edges: [0; CHANNELS],
+            pulse_ends: [0; CHANNELS],
             scanned: false,
             failing: 0,
         }
@@ -103,6 +107,39 @@ impl IoPort {
         &self.edges
     }
 
+    /// Sets a digital output. This ends a pulse of the output.
+    pub(super) fn set_output(&mut self, channel: usize, value: bool) {
+        self.channels.set_bit(channel, value);
+        if let Some(end) = self.pulse_ends.get_mut(channel) {
+            *end = 0;
+        }
+    }
+
+    /// Clears the outputs whose pulse ends at the uptime `now` in ms.
+    pub(super) fn end_pulses(&mut self, now: u32) {
+        for channel in 0..CHANNELS {
+            let is_over = |end: &u32| *end != 0 && now.wrapping_sub(*end).cast_signed() >= 0;
+            if self.pulse_ends.get(channel).is_some_and(is_over) {
+                self.set_output(channel, false);
+            }
+        }
+    }
+
+    /// Does what a link does to an output at the uptime `now` in ms. Nothing happens when a write of the output would be
+    /// rejected.
+    pub(super) fn act(&mut self, channel: usize, act: Act, now: u32) {
+        if self.kind(channel) != Kind::BitOutput || self.failing >> (channel & 7) & 1 != 0 {
+            return;
+        }
+        self.set_output(channel, act.value);
+        if act.pulse_ms > 0
+            && let Some(end) = self.pulse_ends.get_mut(channel)
+        {
+            // 0 stands for no pulse.
+            *end = now.wrapping_add(act.pulse_ms).max(1);
+        }
+    }
+
     /// Stores which channels cannot be read or driven, channel 1 in bit 0.
     pub const fn set_failing(&mut self, channels: u8) {
         self.failing = channels;
@@ -117,7 +154,7 @@ impl IoPort {
     /// Commands an output with a raw value, as SAFE and START have it: 0 or 1 for a bit, 0 to 4095 for a word.
     pub fn command_raw(&mut self, channel: usize, value: u16) {
         match (self.kind(channel), self.setting(channel)) {
-            (Kind::BitOutput, _) => self.channels.set_bit(channel, value != 0),
+            (Kind::BitOutput, _) => self.set_output(channel, value != 0),
             (Kind::WordOutput, Some(settings)) => {
                 let code = Code::new(value);
                 let word = scale::output_from_raw(code, settings.signal, settings.scale);

@@ -52,9 +52,9 @@ const LITTLE_ROOM: usize = 256;
 
 /// The configuration that a start found.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Loaded {
+pub struct Loaded<const SLOTS: usize> {
     /// The stored settings, or the defaults.
-    pub settings: Settings,
+    pub settings: Settings<SLOTS>,
     /// Something was stored but no record is valid: `settings` are the defaults.
     pub invalid: bool,
     /// Number of stored values that this board or firmware does not allow. They have their defaults instead.
@@ -87,7 +87,11 @@ impl Store {
 
     /// Returns the stored configuration, as far as this board allows it. [`Self::prepare`] uses the same record.
     #[must_use]
-    pub fn load(&mut self, board: &Board, flash: &impl Pages) -> Loaded {
+    pub fn load<const SLOTS: usize>(
+        &mut self,
+        board: &'static Board,
+        flash: &impl Pages,
+    ) -> Loaded<SLOTS> {
         while let Some(Newest { page, place }) = self.newest() {
             if let Some(record) = record_at(flash.page(page), place.offset) {
                 let (settings, rejected) = Settings::load(board, record.pairs());
@@ -101,7 +105,7 @@ impl Store {
             self.survey_mut(page).newest = None;
         }
         Loaded {
-            settings: Settings::defaults(),
+            settings: Settings::defaults(board),
             invalid: self.first.written || self.second.written,
             rejected: 0,
         }

@@ -20,7 +20,11 @@ pub struct Saving {
 impl Saving {
     /// Begins a save of these settings. Returns `None` when they are already stored.
     #[must_use]
-    pub fn new(store: &Store, flash: &impl Pages, settings: &Settings) -> Option<Self> {
+    pub fn new<const SLOTS: usize>(
+        store: &Store,
+        flash: &impl Pages,
+        settings: &Settings<SLOTS>,
+    ) -> Option<Self> {
         let newest = store.newest();
         let stored =
             newest.and_then(|newest| record_at(flash.page(newest.page), newest.place.offset));
@@ -43,7 +47,7 @@ impl Saving {
     }
 
     /// Returns the next operation, to be performed before the next call, or `None` when all are done.
-    pub fn next(&mut self, settings: &Settings) -> Option<Operation> {
+    pub fn next<const SLOTS: usize>(&mut self, settings: &Settings<SLOTS>) -> Option<Operation> {
         if let Some(operation) = self.readying.next() {
             return Some(operation);
         }

@@ -1,13 +1,14 @@
 //! Cuts the power in every single operation of simulated device histories, and tries every state that the cut may
 //! leave. The next start must find the complete old or new configuration, and later saves must work.
 
-use firmware::config::Settings;
 use firmware::store::{Operation, Page, Pages, Store, WriteError};
 use register_map::board::MODIO_02;
 
 use crate::PAGE_SIZE;
 use crate::flash::{Fault, MESSES, Mess, MockFlash};
-use crate::running::{fullest_settings, random_settings, save, settings, start, start_well};
+use crate::running::{
+    Settings, fullest_settings, random_settings, save, settings, start, start_well,
+};
 
 enum Event {
     Save(Box<Settings>),
@@ -40,7 +41,7 @@ fn live(flash: MockFlash, first: &Settings, life: &[Event]) -> Vec<Place> {
     let mut places = Vec::new();
     let mut note = |flash: &mut MockFlash, old: &Settings, new: &Settings| {
         for (before, operation) in flash.journal.replace(Vec::new()).unwrap_or_default() {
-            let (old, new) = (old.clone(), new.clone());
+            let (old, new) = (*old, *new);
             places.push(Place {
                 before,
                 operation,
@@ -50,7 +51,7 @@ fn live(flash: MockFlash, first: &Settings, life: &[Event]) -> Vec<Place> {
         }
     };
     flash.journal = Some(Vec::new());
-    let mut stored = first.clone();
+    let mut stored = *first;
     let (loaded, mut store) = start_well(&mut flash);
     assert_eq!(loaded.settings, stored);
     note(&mut flash, &stored, &stored);
@@ -59,7 +60,7 @@ fn live(flash: MockFlash, first: &Settings, life: &[Event]) -> Vec<Place> {
             Save(settings) => {
                 save(&mut store, &mut flash, settings).unwrap();
                 note(&mut flash, &stored, settings);
-                stored = Settings::clone(settings);
+                stored = **settings;
             }
             Spare => {
                 store.make_spare(&mut flash).unwrap();
@@ -131,14 +132,14 @@ fn saves(sizes: impl IntoIterator<Item = usize>) -> Vec<Event> {
 fn cut_in_the_first_start_and_the_first_saves_is_recovered() {
     let mut life = saves([0, 1, 5]);
     life.push(Restart);
-    let cuts = cut_everywhere(MockFlash::erased(), &Settings::defaults(), &life);
+    let cuts = cut_everywhere(MockFlash::erased(), &Settings::defaults(&MODIO_02), &life);
     assert!(cuts > 4 + 7 + 3 * 7, "{cuts}");
 }
 
 #[test]
 fn cut_in_a_save_of_every_setting_is_recovered() {
     let life = [Save(Box::new(fullest_settings(1))), Restart];
-    let places = live(MockFlash::erased(), &Settings::defaults(), &life);
+    let places = live(MockFlash::erased(), &Settings::defaults(&MODIO_02), &life);
     assert!(places.len() > 400, "{}", places.len());
     for (index, place) in places.iter().enumerate() {
         some_messes(index).for_each(|mess| cut_and_recover(place, mess));
@@ -148,7 +149,7 @@ fn cut_in_a_save_of_every_setting_is_recovered() {
 #[test]
 fn cut_in_saves_that_fill_both_pages_without_a_restart_is_recovered() {
     let life = saves([60, 50, 40, 90, 100, 10, 80, 70, 60].repeat(2 * PAGES_OF_1_KIB));
-    let places = live(MockFlash::erased(), &Settings::defaults(), &life);
+    let places = live(MockFlash::erased(), &Settings::defaults(&MODIO_02), &life);
     let erases = places
         .iter()
         .filter(|place| matches!(place.operation, Operation::Erase(_)));
@@ -168,7 +169,7 @@ fn cut_in_an_erase_between_saves_is_recovered_and_saves_never_erase() {
     for save in saves([60, 50, 40, 90, 100, 10, 80, 70, 60].repeat(2 * PAGES_OF_1_KIB)) {
         life.extend([save, Spare]);
     }
-    let places = live(MockFlash::erased(), &Settings::defaults(), &life);
+    let places = live(MockFlash::erased(), &Settings::defaults(&MODIO_02), &life);
     let is_erase = |place: &&Place| matches!(place.operation, Operation::Erase(_));
     let (idle, saving): (Vec<_>, Vec<_>) = places
         .iter()
@@ -196,7 +197,7 @@ fn cut_in_the_compaction_and_the_erases_of_a_start_is_recovered() {
     life.push(Restart);
     life.extend(saves([25, 25]));
     life.push(Restart);
-    let places = live(MockFlash::erased(), &Settings::defaults(), &life);
+    let places = live(MockFlash::erased(), &Settings::defaults(&MODIO_02), &life);
     // Only a start compacts.
     let in_starts: Vec<_> = places
         .iter()
@@ -213,14 +214,14 @@ fn cut_in_the_compaction_and_the_erases_of_a_start_is_recovered() {
 #[test]
 fn cut_in_the_erase_before_the_very_first_record_is_recovered() {
     let half_marked = MockFlash::with(&[0x6F], &[0x6F]);
-    let places = live(half_marked, &Settings::defaults(), &[]);
+    let places = live(half_marked, &Settings::defaults(&MODIO_02), &[]);
     assert!(matches!(places[0].operation, Operation::Erase(_)));
     for place in places {
         let mut flash = place.before;
         flash.cut_in(place.operation, Mess::Complete);
         flash.power_on();
         let (loaded, _) = start_well(&mut flash);
-        assert!(loaded.settings == Settings::defaults() && !loaded.invalid);
+        assert!(loaded.settings == Settings::defaults(&MODIO_02) && !loaded.invalid);
     }
 }
 
@@ -229,7 +230,7 @@ fn cut_in_the_erase_before_the_very_first_record_is_recovered() {
 #[test]
 fn cut_in_the_start_after_a_cut_is_recovered() {
     let life = saves([2, 3]);
-    for place in live(MockFlash::erased(), &Settings::defaults(), &life) {
+    for place in live(MockFlash::erased(), &Settings::defaults(&MODIO_02), &life) {
         for (index, mess) in MESSES.into_iter().enumerate() {
             let mut flash = place.before.clone();
             flash.cut_in(place.operation, mess);
@@ -240,8 +241,8 @@ fn cut_in_the_start_after_a_cut_is_recovered() {
                 let second = Place {
                     before,
                     operation,
-                    old: place.old.clone(),
-                    new: place.new.clone(),
+                    old: place.old,
+                    new: place.new,
                 };
                 cut_and_recover(&second, MESSES[(index + 3) % MESSES.len()]);
             }
@@ -257,8 +258,8 @@ fn cut_in_a_half_word_that_then_reads_as_erased_only_at_the_start_is_recovered()
     let new = settings(&[(0x0141, 0x2222)]);
     let places = live(
         MockFlash::erased(),
-        &Settings::defaults(),
-        &[Save(Box::new(old.clone())), Save(Box::new(new.clone()))],
+        &Settings::defaults(&MODIO_02),
+        &[Save(Box::new(old)), Save(Box::new(new))],
     );
     let first = places.iter().find(|place| place.old == old).unwrap();
     let mut refused = 0;

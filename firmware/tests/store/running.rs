@@ -1,12 +1,15 @@
 //! The steps of a device's life that concern the store.
 
-use firmware::config::Settings;
-use firmware::store::{Loaded, Saving, Store, WriteError};
+use firmware::store::{Saving, Store, WriteError};
 use register_map::board::MODIO_02;
 use register_map::configuration::{COMMAND, KEY, RULES, module_of};
-use register_map::rule_at;
+use register_map::{Module, rule_at};
 
 use crate::flash::{Fault, MockFlash, Noise};
+
+/// The settings of a modio-02, and what a start finds.
+pub type Settings = firmware::config::Settings<1>;
+pub type Loaded = firmware::store::Loaded<1>;
 
 /// MODULE of the board's port.
 const MODULE_SLOT: u16 = module_of(5);
@@ -74,7 +77,7 @@ pub fn random_settings(seed: u64, changed: usize) -> Settings {
 /// Returns settings in which every value that can be changed differs from its default.
 pub fn fullest_settings(seed: u64) -> Settings {
     let mut noise = Noise(seed);
-    let mut pairs = vec![(MODULE_SLOT, 5)];
+    let mut pairs = vec![(MODULE_SLOT, Module::Ao4.code())];
     for rule in RULES
         .iter()
         .filter(|rule| ![KEY, COMMAND].contains(&rule.first))

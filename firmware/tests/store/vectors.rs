@@ -1,6 +1,5 @@
 //! Stored configurations as literal bytes: every later firmware must read what earlier ones have stored.
 
-use firmware::config::Settings;
 use firmware::store::{Page, Saving, Store};
 use register_map::Module;
 use register_map::board::MODIO_02;
@@ -9,7 +8,7 @@ use register_map::record::{SEALS, encode_page, records};
 
 use crate::PAGE_SIZE;
 use crate::flash::MockFlash;
-use crate::running::{save, settings, start_well};
+use crate::running::{Settings, save, settings, start_well};
 
 /// Written by version 0.1: page mark, then two records, the second with another baud rate. The CRCs were computed
 /// by Python's zlib.crc32.
@@ -61,7 +60,7 @@ const LATER: [u8; 44] = [
     0x30, 0x01, 0x09, 0x00, // FILTER of point 16: 9
     0x50, 0x01, 0x34, 0x12, // 0x0150: unknown
     0x60, 0x01, 0xD0, 0x07, // BETA of point 0: 2000
-    0x00, 0x04, 0x01, 0x00, // 0x0400: unknown
+    0x00, 0x04, 0x01, 0x00, // 0x0400: a link of point 0, which has no slot
     0x25, 0x94, 0x0C, 0x04,
     0xFF, 0xFF, 0xFF, 0xFF,
 ];
@@ -125,7 +124,7 @@ fn a_start_keeps_what_only_a_later_firmware_knows() {
 
 #[test]
 fn record_without_room_for_seals_stays_where_it_is_and_is_read() {
-    let pairs: Vec<_> = (0..252).map(|n| (0x0400 + n, 1)).collect();
+    let pairs: Vec<_> = (0..252).map(|n| (0x0600 + n, 1)).collect();
     let mut bytes = [0xFF; PAGE_SIZE + SEALS];
     encode_page(1, &pairs, &mut bytes).unwrap();
     let page: [u8; PAGE_SIZE] = *bytes.first_chunk().unwrap();
@@ -145,11 +144,11 @@ fn another_layout_is_reported_and_kept_until_something_is_saved() {
     let mut flash = MockFlash::holding([bytes, [0xFF; PAGE_SIZE]]);
     for _ in 0..3 {
         let (loaded, _) = start_well(&mut flash);
-        assert!(loaded.invalid && loaded.settings == Settings::defaults());
+        assert!(loaded.invalid && loaded.settings == Settings::defaults(&MODIO_02));
         assert_eq!(flash.pages[0], bytes, "the page is kept as evidence");
     }
     let (_, mut store) = start_well(&mut flash);
-    assert!(save(&mut store, &mut flash, &Settings::defaults()).unwrap());
+    assert!(save(&mut store, &mut flash, &Settings::defaults(&MODIO_02)).unwrap());
     assert!(!start_well(&mut flash).0.invalid);
 }
 

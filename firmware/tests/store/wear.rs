@@ -1,18 +1,19 @@
 //! The wear of the flash, and the behaviour when the flash is worn out.
 
-use firmware::config::Settings;
 use firmware::store::{Page, WriteError};
 use register_map::board::MODIO_02;
 
 use crate::flash::{MockFlash, Noise};
-use crate::running::{fullest_settings, random_settings, save, settings, start, start_well};
+use crate::running::{
+    Settings, fullest_settings, random_settings, save, settings, start, start_well,
+};
 
 #[test]
 fn saving_what_is_stored_programs_nothing() {
     let mut flash = MockFlash::erased();
     let (_, mut store) = start_well(&mut flash);
     let before = flash.operations();
-    assert!(!save(&mut store, &mut flash, &Settings::defaults()).unwrap());
+    assert!(!save(&mut store, &mut flash, &Settings::defaults(&MODIO_02)).unwrap());
     let settings = random_settings(1, 30);
     assert!(save(&mut store, &mut flash, &settings).unwrap());
     let after = flash.operations();
@@ -76,7 +77,7 @@ fn garbage_gives_the_defaults_and_is_reported_until_something_is_saved() {
         }
         for _ in 0..2 {
             let (loaded, _) = start_well(&mut flash);
-            assert!(loaded.invalid && loaded.settings == Settings::defaults());
+            assert!(loaded.invalid && loaded.settings == Settings::defaults(&MODIO_02));
         }
         let (_, mut store) = start_well(&mut flash);
         let settings = random_settings(seed, 9);

@@ -8,8 +8,8 @@ use minicbor::Decoder;
 use crate::format::{self, PORT_BYTES, VERSION};
 use crate::limit;
 use crate::{
-    Description, Error, ModuleType, Narrower, PointKind, Port, Reading, Register, Unit, Value,
-    Values,
+    Description, Error, Field, ModuleType, Narrower, PointKind, Port, Reading, Register, Unit,
+    Value, Values,
 };
 
 type Read<T> = Result<T, Error>;
@@ -160,9 +160,10 @@ fn ports(d: &mut Decoder<'_>) -> Read<Vec<Port>> {
     if !rest.is_empty() {
         return Err(form("a port without a whole module code"));
     }
-    let ports = ports.iter().map(|&[number, high, low]| Port {
+    let ports = ports.iter().map(|&[number, lacks, module]| Port {
         number,
-        module: u16::from_be_bytes([high, low]),
+        module: module.into(),
+        lacks,
     });
     Ok(ports.collect())
 }
@@ -226,7 +227,7 @@ fn register(d: &mut Decoder<'_>, kinds: usize) -> Read<Register> {
     let mut fields = Fields::of(d)?;
     let address = fields.next(u16)?;
     let name = fields.next(name)?;
-    let value = fields.next(value)?;
+    let value = fields.next(|d| meaning(d, kinds))?;
     let about = fields.next(|d| text(d, limit::ABOUT))?;
     let count = fields.option(u16)?.unwrap_or(format::COUNT);
     let scope = fields.option(u8)?.map_or(format::SCOPE, format::scope_of);
@@ -262,6 +263,39 @@ fn narrower(d: &mut Decoder<'_>, kinds: usize) -> Read<Narrower> {
     Ok(narrower)
 }
 
+/// Reads the meaning of registers.
+fn meaning(d: &mut Decoder<'_>, kinds: usize) -> Read<Value> {
+    // Fields are not nested, so that the depth of a document is limited.
+    let start = d.position();
+    let mut items = Fields::of(d)?;
+    if items.next(u8)? != format::FIELDS {
+        d.set_position(start);
+        return value(d);
+    }
+    let kind = items.next(|d| place(d, kinds))?;
+    let fields = items.next(|d| list(d, field))?;
+    items.end()?;
+    if fields.is_empty() || fields.len() > limit::CODES {
+        return Err(form(format!(
+            "{} fields of a value (byte {start})",
+            fields.len()
+        )));
+    }
+    Ok(Value::Fields { kind, fields })
+}
+
+fn field(d: &mut Decoder<'_>) -> Read<Field> {
+    let mut items = Fields::of(d)?;
+    let field = Field {
+        name: items.next(name)?,
+        value: items.next(value)?,
+        values: items.option(values)?.unwrap_or(format::ANY),
+        default: items.option(u16)?.unwrap_or_default(),
+    };
+    items.end()?;
+    Ok(field)
+}
+
 /// Reads the meaning of a number. An unknown kind of value becomes a value without meaning.
 fn value(d: &mut Decoder<'_>) -> Read<Value> {
     let mut fields = Fields::of(d)?;
@@ -270,6 +304,7 @@ fn value(d: &mut Decoder<'_>) -> Read<Value> {
         format::LONG => Value::Long(unit(&mut fields)?),
         format::CODES => Value::Codes(fields.next(|d| names(d, u16))?),
         format::BITS => Value::Bits(fields.next(|d| names(d, bit))?),
+        format::POINT => Value::Point,
         _ => Value::Opaque,
     };
     fields.end()?;

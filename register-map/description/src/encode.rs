@@ -5,7 +5,9 @@ use std::convert::Infallible;
 use minicbor::Encoder;
 
 use crate::format::{self, PORT_BYTES};
-use crate::{Description, ModuleType, Narrower, PointKind, Reading, Register, Unit, Value, Values};
+use crate::{
+    Description, Field, ModuleType, Narrower, PointKind, Reading, Register, Unit, Value, Values,
+};
 
 type Out<'a> = Encoder<&'a mut Vec<u8>>;
 /// Writing to memory does not fail.
@@ -33,10 +35,10 @@ fn document(e: &mut Out<'_>, of: &Description) -> Done {
     of.modules.iter().try_for_each(|one| module_type(e, one))?;
     e.array(of.registers.len() as u64)?;
     of.registers.iter().try_for_each(|one| register(e, one))?;
-    let ports = of.ports.iter().flat_map(|port| {
-        let [high, low] = port.module.to_be_bytes();
-        [port.number, high, low]
-    });
+    let ports = of
+        .ports
+        .iter()
+        .flat_map(|port| [port.number, port.lacks, port.module as u8]);
     let ports: Vec<u8> = ports.collect();
     debug_assert!(ports.len().is_multiple_of(PORT_BYTES));
     e.bytes(&ports)?;
@@ -142,7 +144,34 @@ fn value(e: &mut Out<'_>, value: &Value) -> Done {
             e.array(1)?.u8(format::OPAQUE)?;
             Ok(())
         }
+        Value::Point => {
+            e.array(1)?.u8(format::POINT)?;
+            Ok(())
+        }
+        Value::Fields { kind, fields } => {
+            e.array(3)?.u8(format::FIELDS)?.u8(*kind)?;
+            e.array(fields.len() as u64)?;
+            fields.iter().try_for_each(|one| field(e, one))
+        }
     }
+}
+
+/// Trailing items with default values are omitted.
+fn field(e: &mut Out<'_>, field: &Field) -> Done {
+    let items = match field {
+        Field { default: 1.., .. } => 4,
+        Field { values, .. } if *values != format::ANY => 3,
+        _ => 2,
+    };
+    e.array(items)?.str(&field.name)?;
+    value(e, &field.value)?;
+    if items > 2 {
+        values(e, &field.values)?;
+    }
+    if items > 3 {
+        e.u16(field.default)?;
+    }
+    Ok(())
 }
 
 /// Returns the number of fields of a unit at the end of an array: none for a plain number.

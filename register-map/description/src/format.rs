@@ -14,6 +14,8 @@ pub(crate) const LONG: u8 = 1;
 pub(crate) const CODES: u8 = 2;
 pub(crate) const BITS: u8 = 3;
 pub(crate) const OPAQUE: u8 = 4;
+pub(crate) const POINT: u8 = 5;
+pub(crate) const FIELDS: u8 = 6;
 
 /// Kinds of sets of values.
 pub(crate) const RANGE: u8 = 0;

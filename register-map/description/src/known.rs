@@ -2,11 +2,11 @@
 
 use register_map::points::{self, Kind};
 use register_map::state::MAP_VERSION_VALUE;
-use register_map::{Access, BLOCKS, Board, InForce, Module, Rule, Text};
+use register_map::{Access, Board, InForce, Module, Rule, Text, configuration};
 
 use crate::{
-    Description, ModuleType, Narrower, PointKind, Port, Reading, Register, Scope, Table, Unit,
-    Value, Values,
+    Description, Field, ModuleType, Narrower, PointKind, Port, Reading, Register, Scope, Table,
+    Unit, Value, Values,
 };
 
 /// The kinds of point in the order of [`Description::kinds`].
@@ -21,16 +21,15 @@ const KINDS: [Kind; 5] = [
 /// Describes a unit of this board with firmware of this version. `module` returns the module in force at a port, 1
 /// to 8.
 pub fn describe(board: &Board, firmware: &str, module: impl Fn(u16) -> Module) -> Description {
-    let blocks = BLOCKS
-        .iter()
-        .filter(|block| block.first != points::BLOCK.first);
-    let registers = blocks.flat_map(|block| block.registers());
     Description {
         board: board.name.to_owned(),
         model: board.model.to_owned(),
         firmware: firmware.to_owned(),
         map_version: MAP_VERSION_VALUE,
-        registers: registers.map(|(rule, text)| register(rule, text)).collect(),
+        registers: board
+            .registers()
+            .map(|(rule, text)| register(board, rule, text))
+            .collect(),
         kinds: KINDS.map(kind).into(),
         modules: Module::ALL.map(module_type).into(),
         ports: board
@@ -38,12 +37,13 @@ pub fn describe(board: &Board, firmware: &str, module: impl Fn(u16) -> Module) -
             .map(|number| Port {
                 number: number as u8,
                 module: module(number).code(),
+                lacks: board.fixed(number).map_or(0, |port| 4 - port.channels),
             })
             .collect(),
     }
 }
 
-fn register(rule: &Rule, text: &Text) -> Register {
+fn register(board: &Board, rule: &Rule, text: &Text) -> Register {
     Register {
         address: rule.first,
         count: rule.count,
@@ -54,7 +54,11 @@ fn register(rule: &Rule, text: &Text) -> Register {
             register_map::Scope::Point => Scope::Point,
         },
         value: value(text.value),
-        writable: rule.access != Access::ReadOnly,
+        writable: match rule.first {
+            configuration::MODULE => board.ports().any(|port| board.chooses(port)),
+            configuration::RANGE => board.fixed.is_empty(),
+            _ => rule.access != Access::ReadOnly,
+        },
         restart: rule.in_force == InForce::Restart,
         values: values(rule.values),
         default: rule.default,
@@ -75,6 +79,20 @@ fn value(value: register_map::Value) -> Value {
         register_map::Value::Codes(names) => Value::Codes(owned(names)),
         register_map::Value::Bits(names) => Value::Bits(owned(names)),
         register_map::Value::Opaque => Value::Opaque,
+        register_map::Value::Point => Value::Point,
+        register_map::Value::Fields(kind, fields) => Value::Fields {
+            kind: place(kind),
+            fields: fields.iter().map(field).collect(),
+        },
+    }
+}
+
+fn field(field: &register_map::Field) -> Field {
+    Field {
+        name: field.name.to_owned(),
+        value: value(field.value),
+        values: values(field.values),
+        default: field.default,
     }
 }
 
@@ -140,27 +158,31 @@ fn module_type(module: Module) -> ModuleType {
 
 #[cfg(test)]
 mod tests {
-    use register_map::board::MODIO_02;
+    use register_map::board::{MODIO_02, MODIO_08};
 
     use super::*;
 
     #[test]
     fn a_description_has_every_register_with_its_scope() {
-        let unit = describe(&MODIO_02, "0.1.0", |_| Module::Ai4);
+        let unit = describe(&MODIO_08, "0.1.0", |_| Module::Ai4);
         let of = |name: &str| unit.registers.iter().find(|r| r.name == name).unwrap();
         assert_eq!(of("BAUD").scope, Scope::Unit);
         assert_eq!(of("MODULE").scope, Scope::Port);
         assert_eq!(of("FILTER").scope, Scope::Point);
         assert_eq!(of("pulses").scope, Scope::Point);
+        assert_eq!(of("link").scope, Scope::Point);
         assert_eq!(of("product code").scope, Scope::Unit);
         assert_eq!(of("unique device identity").scope, Scope::Unit);
         assert_eq!(of("FILTER").narrower.as_ref().unwrap().kind, 3);
         assert!(unit.registers.is_sorted_by_key(|r| r.address));
+        let unit = describe(&MODIO_02, "0.1.0", |_| Module::Ai4);
+        assert!(unit.registers.iter().all(|r| r.name != "link"));
         assert_eq!(
             unit.ports,
             [Port {
                 number: 5,
-                module: 4
+                module: 4,
+                lacks: 0,
             }]
         );
     }

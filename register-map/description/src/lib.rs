@@ -107,6 +107,40 @@ pub enum Value {
     Bits(Vec<(u8, String)>),
     /// All registers of the run are one value without further meaning.
     Opaque,
+    /// The address of a point in each register; 0xFFFF = none.
+    Point,
+    /// Consecutive registers with a meaning of their own. They are written together.
+    Fields {
+        /// Kind of the points that have these registers: its index in [`Description::kinds`].
+        kind: u8,
+        /// The registers in order.
+        fields: Vec<Field>,
+    },
+}
+
+/// One of the registers of a [`Value::Fields`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Field {
+    /// Name.
+    pub name: String,
+    /// Meaning of its number: one register.
+    pub value: Value,
+    /// Allowed values. Others of the fields may restrict them.
+    pub values: Values,
+    /// Factory default.
+    pub default: u16,
+}
+
+impl Value {
+    /// Returns the number of registers of one value; for [`Self::Opaque`] 1, although all registers together are a value.
+    #[must_use]
+    pub const fn registers(&self) -> u16 {
+        match self {
+            Self::Long(_) => 2,
+            Self::Fields { fields, .. } => fields.len() as u16,
+            _ => 1,
+        }
+    }
 }
 
 /// Unit of a number: the quantity is `(number + offset) * 10^exponent` in the unit.
@@ -179,11 +213,13 @@ pub struct ModuleType {
     pub points: [u8; 4],
 }
 
-/// A port with a slot.
+/// A port with points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Port {
     /// Number of the port, 1 to 8.
     pub number: u8,
     /// Code of the module in force.
     pub module: u16,
+    /// Number of the module's channels that the port does not have: the last ones.
+    pub lacks: u8,
 }

@@ -1,6 +1,6 @@
 //! Limits of a description. They leave room for many times the registers of today's units.
 
-use crate::{Description, Reading, Register, Scope, Value};
+use crate::{Description, Reading, Register, Scope};
 
 /// Longest name, version or code of a unit, in bytes.
 pub const NAME: usize = 64;
@@ -70,10 +70,7 @@ pub fn check(description: &Description) -> Result<(), String> {
 
 /// Returns the number of registers in a run: its count, but not less than its values need.
 fn span(register: &Register) -> u32 {
-    let words = match register.value {
-        Value::Long(_) => 2,
-        _ => 1,
-    };
+    let words = u32::from(register.value.registers());
     let values = match register.scope {
         Scope::Unit => 1,
         Scope::Port => u32::from(PORTS),

@@ -2,8 +2,8 @@
 
 use minicbor::Encoder;
 use modio_description::{
-    Description, Error, FILE, HEAD, Narrower, PORT_BYTES, Port, Reading, Register, Scope, Unit,
-    VERSION, Value, Values, checksum, describe, records,
+    Description, Error, FILE, Field, HEAD, Narrower, PORT_BYTES, Port, Reading, Register, Scope,
+    Unit, VERSION, Value, Values, checksum, describe, records,
 };
 use proptest::prelude::*;
 use register_map::board::{MODIO_02, MODIO_08};
@@ -36,7 +36,8 @@ fn the_ports_are_the_last_bytes() {
         ports: (1..=4)
             .map(|number| Port {
                 number,
-                module: 0x0102 * u16::from(number),
+                module: u16::from(number),
+                lacks: number - 1,
             })
             .collect(),
         ..mixed
@@ -45,7 +46,7 @@ fn the_ports_are_the_last_bytes() {
     assert_eq!(none.len(), mixed.len());
     let (same, last) = mixed.split_at(mixed.len() - 4 * PORT_BYTES);
     assert!(none.starts_with(same));
-    assert_eq!(last, [1, 1, 2, 2, 2, 4, 3, 3, 6, 4, 4, 8]);
+    assert_eq!(last, [1, 0, 1, 2, 1, 2, 3, 2, 3, 4, 3, 4]);
 }
 
 #[test]
@@ -180,7 +181,8 @@ fn fields_and_kinds_of_a_later_version_are_skipped() {
     assert_eq!(register(&unit, "PLAIN").value, plain);
     let port = Port {
         number: 2,
-        module: 0x012C,
+        module: 0x2C,
+        lacks: 1,
     };
     assert_eq!(unit.ports, [port]);
 }
@@ -327,12 +329,28 @@ fn units() -> impl Strategy<Value = Unit> {
 }
 
 fn meanings() -> impl Strategy<Value = Value> {
+    let parts = (text(), numbers(), sets(), any::<u16>());
+    let field = parts.prop_map(|(name, value, values, default)| Field {
+        name,
+        value,
+        values,
+        default,
+    });
+    prop_oneof![
+        numbers(),
+        (0..5_u8, prop::collection::vec(field, 1..4))
+            .prop_map(|(kind, fields)| Value::Fields { kind, fields }),
+    ]
+}
+
+fn numbers() -> impl Strategy<Value = Value> {
     prop_oneof![
         units().prop_map(Value::Number),
         units().prop_map(Value::Long),
         prop::collection::vec((any::<u16>(), text()), 0..4).prop_map(Value::Codes),
         prop::collection::vec((0..16_u8, text()), 0..4).prop_map(Value::Bits),
         Just(Value::Opaque),
+        Just(Value::Point),
     ]
 }
 
@@ -346,7 +364,7 @@ fn sets() -> impl Strategy<Value = Values> {
 }
 
 fn narrowers() -> impl Strategy<Value = Narrower> {
-    let parts = (0..5_u8, sets(), any::<u16>(), prop::option::of(meanings()));
+    let parts = (0..5_u8, sets(), any::<u16>(), prop::option::of(numbers()));
     parts.prop_map(|(kind, values, default, value)| Narrower {
         kind,
         values,

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use anyhow::{Context as _, Result, bail, ensure};
 use register_map::points::{self, Kind, output_values};
-use register_map::{BLOCKS, Board, Module, Values, codes, configuration, state};
+use register_map::{BLOCKS, Board, Module, Rule, Values, codes, configuration, links, state};
 
 use crate::bench::Bench;
 use crate::case::Check;
@@ -176,8 +176,12 @@ fn modio(bench: &mut Bench<'_>) -> Check<Target> {
     let bits = modio.runs(&[Kind::BitInput, Kind::BitOutput]);
     let mut registers = modio.runs(&[Kind::WordInput, Kind::WordOutput]);
     for block in BLOCKS.into_iter().skip(1) {
+        if block.first == links::LINKS {
+            continue;
+        }
         let mut open: Option<Span> = None;
-        for (rule, _) in block.registers() {
+        let there = |(rule, _): &(&Rule, _)| board.is_none_or(|board| board.has(rule.first));
+        for (rule, _) in block.registers().filter(there) {
             let here = Span::of(rule.first, rule.count);
             match &mut open {
                 Some(span) if span.last + 1 == here.first => span.last = here.last,
@@ -185,6 +189,15 @@ fn modio(bench: &mut Bench<'_>) -> Check<Target> {
             }
         }
         registers.extend(open);
+    }
+    if board.is_some_and(|board| links::exist(board.slots.into())) {
+        for second in [false, true] {
+            let outputs = modio.runs(&[Kind::BitOutput]).into_iter();
+            registers.extend(outputs.map(|span| {
+                let count = span.last - span.first + 1;
+                Span::of(links::of_point(span.first, second), links::WORDS * count)
+            }));
+        }
     }
     target.readable = [bits.clone(), bits, registers.clone(), registers];
     target.bits = modio.runs(&[Kind::BitOutput]).first().copied();

@@ -29,6 +29,10 @@ pub fn values(item: &Item) -> String {
             let names: Vec<_> = allowed.map(|(_, name)| name.as_str()).collect();
             names.join(" | ")
         }
+        (_, Meaning::Value(Value::Fields { fields, .. })) => {
+            let names: Vec<_> = fields.iter().map(|field| field.name.as_str()).collect();
+            names.join(", ")
+        }
         (Some(values), _) => takes(values, &unit),
         (None, Meaning::Bit) => "off | on".to_owned(),
         (None, _) => unit_name(&unit.code).to_owned(),

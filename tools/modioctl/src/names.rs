@@ -4,10 +4,15 @@ use modio_description::{
     Description, ModuleType, PointKind, Reading, Register, Scope, Table, Unit, Value, Values,
 };
 
+use register_map::configuration::MODULE;
+use register_map::{Board, points};
+
 use crate::failure::Failure;
 
 /// Number of points of a port.
 const CHANNELS: u16 = 4;
+/// Number of points of all ports.
+const POINTS: u16 = 8 * CHANNELS;
 
 /// An item that can be read: a point, a register, or an address without known meaning.
 #[derive(Clone, Debug, PartialEq)]
@@ -266,7 +271,8 @@ fn unknown(address: u16) -> Item {
 fn kinds(description: &Description) -> impl Iterator<Item = (u16, u16, &PointKind)> {
     description.ports.iter().flat_map(move |port| {
         let points = module(description, port.module).map_or([0; 4], |module| module.points);
-        (1..).zip(points).filter_map(move |(channel, kind)| {
+        let channels = 1..=CHANNELS.saturating_sub(port.lacks.into());
+        channels.zip(points).filter_map(move |(channel, kind)| {
             let kind = description.kinds.get(usize::from(kind))?;
             Some((u16::from(port.number), channel, kind))
         })
@@ -308,8 +314,7 @@ fn points(description: &Description, readings: &[(u16, u16)]) -> Vec<Item> {
 fn registers(description: &Description, register: &Register) -> Vec<Item> {
     let each = match (&register.value, register.scope) {
         (Value::Opaque, Scope::Unit) => register.count,
-        (Value::Long(_), _) => 2,
-        _ => 1,
+        (value, _) => value.registers(),
     };
     let item = |name: String, index: u16| Item {
         name,
@@ -332,13 +337,23 @@ fn registers(description: &Description, register: &Register) -> Vec<Item> {
             .collect(),
         Scope::Port => {
             let ports = description.ports.iter().map(|port| u16::from(port.number));
+            let board = Board::named(&description.board);
             ports
-                .map(|port| item(format!("p{port}.{name}"), port.max(1) - 1))
+                .map(|port| {
+                    let mut item = item(format!("p{port}.{name}"), port.max(1) - 1);
+                    if is_module(&item) && board.is_some_and(|board| !board.chooses(port)) {
+                        (item.writable, item.setting, item.values) = (false, false, None);
+                    }
+                    item
+                })
                 .collect()
         }
-        Scope::Point => kinds(description)
-            .map(|(port, channel, kind)| {
-                let mut item = item(format!("p{port}.{channel}.{name}"), point(port, channel));
+        Scope::Point => points_of(description, register)
+            .map(|(port, channel, kind, row)| {
+                let number = row.map(|row| (row + 1).to_string()).unwrap_or_default();
+                let name = format!("p{port}.{channel}.{name}{number}");
+                let index = row.unwrap_or_default() * POINTS + point(port, channel);
+                let mut item = item(name, index);
                 let narrower = register.narrower.as_ref().filter(|narrower| {
                     description.kinds.get(usize::from(narrower.kind)) == Some(kind)
                 });
@@ -353,6 +368,29 @@ fn registers(description: &Description, register: &Register) -> Vec<Item> {
             })
             .collect(),
     }
+}
+
+/// Iterates over the points of the values of a run: port, channel and kind of point, and the row of the value, if a point has
+/// several.
+fn points_of<'a>(
+    description: &'a Description,
+    register: &'a Register,
+) -> impl Iterator<Item = (u16, u16, &'a PointKind, Option<u16>)> {
+    let rows = register.count / register.value.registers().saturating_mul(POINTS).max(1);
+    let of_kind = match &register.value {
+        Value::Fields { kind, .. } => description.kinds.get(usize::from(*kind)),
+        _ => None,
+    };
+    let points = kinds(description).filter(move |(.., kind)| of_kind.is_none_or(|of| of == *kind));
+    points.flat_map(move |(port, channel, kind)| {
+        let rows = (0..rows.max(1)).map(move |row| (rows > 1).then_some(row));
+        rows.map(move |row| (port, channel, kind, row))
+    })
+}
+
+/// Returns whether an item is MODULE of a port.
+pub fn is_module(item: &Item) -> bool {
+    (MODULE..MODULE + points::PORTS).contains(&item.address)
 }
 
 /// Returns whether a writable register is a setting, and not the lock, a command or a counter.
@@ -376,7 +414,7 @@ pub fn book(
 mod tests {
     use modio_description::describe;
     use register_map::Module;
-    use register_map::board::{MODIO_02, MODIO_08};
+    use register_map::board::{FX3U_24, MODIO_02, MODIO_08};
 
     use super::*;
 
@@ -398,9 +436,55 @@ mod tests {
         assert_eq!(address("p5.module"), Ok((0x114, 1)));
         assert_eq!(address("p5.2.pulses"), Ok((0x322, 2)));
         assert_eq!(address("product_code"), Ok((0x200, 2)));
+        assert_eq!(address("p5.2.last_edge"), Ok((0x3A2, 2)));
+        assert_eq!(address("uptime_ms"), Ok((0x226, 2)));
         assert_eq!(address("0x0101"), Ok((0x101, 1)));
         assert_eq!(book.find("0x0101").unwrap().name, "BAUD");
         assert_eq!(book.find("4096").unwrap().meaning, Meaning::Unknown);
+    }
+
+    #[test]
+    fn digital_outputs_have_two_links() {
+        let book = super::book(&MODIO_08, Module::Relay2, (0, 0));
+        let links = book
+            .items()
+            .iter()
+            .filter(|item| item.name.contains(".link"));
+        let links: Vec<_> = links
+            .map(|item| (item.name.as_str(), item.address))
+            .collect();
+        assert_eq!(
+            links[..3],
+            [
+                ("p1.3.link1", 0x0408),
+                ("p1.3.link2", 0x0488),
+                ("p1.4.link1", 0x040C)
+            ]
+        );
+        assert_eq!(links.len(), 4 * 4);
+        let last = book.find("4.4.LINK2").unwrap();
+        assert_eq!((last.address, last.words, last.setting), (0x04BC, 4, true));
+    }
+
+    #[test]
+    fn items_are_those_of_a_board_without_slots() {
+        let module = |port| FX3U_24.fixed(port).map_or(Module::None, |port| port.module);
+        let book = Book::new(describe(&FX3U_24, "0.1.0", module), vec![(0, 0); 32]);
+        for (name, setting) in [
+            ("UNIT", Some(true)),
+            ("p7.2", Some(false)),
+            ("p7.3", None),
+            ("p7.2.safe", Some(true)),
+            ("p7.3.safe", None),
+            ("p7.module", Some(false)),
+            ("p8.module", Some(true)),
+            ("p8.1.range", Some(false)),
+            ("LORA", None),
+            ("p7.2.link1", Some(true)),
+        ] {
+            let item = book.find(name).ok();
+            assert_eq!(item.map(|item| item.setting), setting, "{name}");
+        }
     }
 
     #[test]

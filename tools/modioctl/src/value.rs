@@ -1,6 +1,6 @@
 //! Values of points and registers, formatted for people and programs, and parsed from the user's input.
 
-use modio_description::{Table, Unit, Value, Values};
+use modio_description::{Field, Table, Unit, Value, Values};
 use serde_json::{Value as Json, json};
 
 use crate::failure::Failure;
@@ -82,6 +82,63 @@ fn register(value: &Value, words: &[u16], raw: bool) -> Shown {
             let digits: String = words.iter().map(|word| format!("{word:04X}")).collect();
             text(&digits)
         }
+        Value::Point => match first {
+            NO_POINT => text("none"),
+            point => text(&point_name(point)),
+        },
+        Value::Fields { fields, .. } => text(&shown_fields(fields, words, raw)),
+    }
+}
+
+/// The address that stands for no point.
+const NO_POINT: u16 = 0xFFFF;
+
+fn point_name(address: u16) -> String {
+    format!("p{}.{}", address / 4 + 1, address % 4 + 1)
+}
+
+/// Returns the values of fields, without those at the end that are the default; `none` when all are.
+fn shown_fields(fields: &[Field], words: &[u16], raw: bool) -> String {
+    let pairs = fields.iter().zip(words);
+    let last = pairs
+        .clone()
+        .rposition(|(field, word)| *word != field.default);
+    let Some(last) = last else {
+        return "none".to_owned();
+    };
+    let shown = pairs.map(|(field, word)| register(&field.value, &[*word], raw).to_string());
+    shown.take(last + 1).collect::<Vec<_>>().join(", ")
+}
+
+/// Returns the words of fields in `text`, which are separated by commas. Those that are missing at the end have their
+/// defaults. `none` stands for the defaults of all.
+fn fields_of(item: &Item, fields: &[Field], text: &str, raw: bool) -> Result<Vec<u16>, String> {
+    let mut texts = text.split(',').map(str::trim).peekable();
+    if text.trim().eq_ignore_ascii_case("none") {
+        texts.next();
+    }
+    let mut all = Vec::new();
+    for field in fields {
+        let Some(text) = texts.next() else {
+            all.push(field.default);
+            continue;
+        };
+        let field_item = Item {
+            name: field.name.clone(),
+            words: 1,
+            meaning: Meaning::Value(field.value.clone()),
+            values: Some(field.values.clone()),
+            ..item.clone()
+        };
+        let word = words(&field_item, text, raw);
+        all.extend(word.map_err(|takes| format!("{}: {takes}", field.name))?);
+    }
+    match texts.next() {
+        None => Ok(all),
+        Some(_) => Err(format!(
+            "it has {} parts, separated by commas",
+            fields.len()
+        )),
     }
 }
 
@@ -201,12 +258,31 @@ fn words(item: &Item, text: &str, raw: bool) -> Result<Vec<u16>, String> {
             };
         }
         Meaning::Value(Value::Bits(_)) => word.ok_or("it takes a number")?,
+        Meaning::Value(Value::Point) if text.eq_ignore_ascii_case("none") => NO_POINT,
+        Meaning::Value(Value::Point) => {
+            let point = point_of(text).or(word);
+            point.ok_or("it takes a point such as p1.1, or none")?
+        }
+        Meaning::Value(Value::Fields { fields, .. }) => {
+            return fields_of(item, fields, text, raw);
+        }
         Meaning::Value(Value::Opaque) => {
             return Err("it has no values that can be written".to_owned());
         }
         Meaning::Unknown => word.ok_or("it takes 0 to 65535")?,
     };
     Ok(vec![word])
+}
+
+/// Returns the address of a point, `p1.1` or `1.1`.
+fn point_of(text: &str) -> Option<u16> {
+    let (port, channel) = text
+        .strip_prefix(['p', 'P'])
+        .unwrap_or(text)
+        .split_once('.')?;
+    let (port, channel) = (number_of(port)?, number_of(channel)?);
+    let known = (1..=8).contains(&port) && (1..=4).contains(&channel);
+    known.then(|| (port - 1) * 4 + channel - 1)
 }
 
 fn check_raw(item: &Item, word: u16) -> Result<(), String> {
@@ -278,7 +354,7 @@ pub const fn table_name(table: Table) -> &'static str {
 #[cfg(test)]
 mod tests {
     use register_map::Module;
-    use register_map::board::MODIO_02;
+    use register_map::board::{MODIO_02, MODIO_08};
 
     use super::*;
     use crate::names::{self, Book};
@@ -328,6 +404,28 @@ mod tests {
         assert_eq!(parsed(&book, "p5.3.safe", "0xFFFF"), Ok(0xFFFF));
         assert_eq!(parsed(&book, "p5.module", "4ai"), Ok(4));
         assert_eq!(parsed(&book, "LORA_CHANNEL", "433"), Ok(23));
+    }
+
+    #[test]
+    fn fields_are_separated_by_commas() {
+        let book = names::book(&MODIO_08, Module::Relay2, (0, 0));
+        let link = book.find("p1.3.link1").unwrap();
+        for (text, words) in [
+            ("none", [0xFFFF, 0, 0, 0]),
+            ("p1.1, toggle", [0, 3, 0, 0]),
+            ("p1.2, pulse if alone, 25", [1, 0x104, 25, 0]),
+            ("p1.1, follow, 0, 7", [0, 1, 0, 7]),
+            ("none, set", [0xFFFF, 5, 0, 0]),
+        ] {
+            assert_eq!(show(&link, &words, false).text, text);
+            assert_eq!(parse(&link, text, false), Ok(words.to_vec()));
+        }
+        assert_eq!(show(&link, &[16, 3, 0, 0], true).text, "p5.1, 3");
+        assert_eq!(parse(&link, "5.1,TOGGLE", false), Ok(vec![16, 3, 0, 0]));
+        let wrong = |text| parse(&link, text, false).unwrap_err().to_string();
+        assert!(wrong("p9.1").contains("source: it takes a point such as p1.1"));
+        assert!(wrong("p5.1, blink").contains("action: it takes 0 = none, 1 = follow"));
+        assert!(wrong("p5.1, set, 1, 2, 3").contains("it has 4 parts"));
     }
 
     #[test]

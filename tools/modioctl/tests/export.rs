@@ -338,7 +338,7 @@ fn with_texts(mut unit: Description, texts: &[String]) -> Description {
             Value::Number(unit) | Value::Long(unit) => unit.code = next(),
             Value::Codes(names) => names.iter_mut().for_each(|(_, name)| *name = next()),
             Value::Bits(names) => names.iter_mut().for_each(|(_, name)| *name = next()),
-            Value::Opaque => {}
+            Value::Opaque | Value::Point | Value::Fields { .. } => {}
         }
         // The exports select registers by these names.
         let is_exported = [

@@ -4,10 +4,15 @@ extern crate std;
 use std::vec::Vec;
 
 use super::*;
+
+/// The settings of a modio-02.
+type Settings = super::Settings<1>;
 use register_map::board::{MODIO_02, MODIO_08};
 use register_map::configuration::{
     BAUD, FILTER, HOLD, LORA_ADDRESS, RANGE, SAFE, START, module_of,
 };
+
+use register_map::record::{FIRST_OFFSET, OVERHEAD};
 
 const SLOT: u16 = points::first(5);
 const MODULE_SLOT: u16 = module_of(5);
@@ -22,13 +27,28 @@ fn loaded(pairs: &[(u16, u16)]) -> (Settings, u16) {
 
 #[test]
 fn defaults_are_the_factory_settings_and_count_as_unchanged() {
-    let settings = Settings::defaults();
+    let settings = Settings::defaults(&MODIO_02);
     assert_eq!((settings.get(BAUD), settings.get(FILTER + SLOT)), (96, 5));
     assert_eq!((settings.get(0x0145), settings.get(0x017F)), (300, 3950));
     assert_eq!((settings.get(0x0201), settings.get(0x0001)), (0, 0));
     assert_eq!(changed(&settings), []);
-    assert_eq!(RESTARTS, 6 + 8 + 6 + 32);
+    assert_eq!(RESTARTS, 7 + 8 + 6 + 32);
     assert_eq!(settings.restart_values().count(), RESTARTS);
+}
+
+#[test]
+fn the_record_of_all_settings_fits_in_a_page() {
+    for board in Board::ALL {
+        let settings: u16 = RULES.iter().map(|rule| rule.count).sum();
+        let slots = if links::exist(board.slots.into()) {
+            board.slots
+        } else {
+            0
+        };
+        let pairs = settings + slots * points::CHANNELS * links::EACH * links::WORDS;
+        let size = FIRST_OFFSET + OVERHEAD + 4 * usize::from(pairs);
+        assert!(size <= board.store.bytes as usize, "{board}: {size}");
+    }
 }
 
 #[test]
@@ -84,7 +104,7 @@ fn a_value_not_allowed_is_counted_and_an_unknown_address_is_ignored() {
 fn modules_are_accepted_only_on_ports_with_a_slot() {
     let pairs = (1..=8).map(|port| (module_of(port), 2));
     let ports = |board| {
-        let (settings, rejected) = Settings::load(board, pairs.clone());
+        let (settings, rejected) = super::Settings::<4>::load(board, pairs.clone());
         let ports: Vec<_> = (1..=8)
             .filter(|port| settings.module(*port) == Module::Do4)
             .collect();
@@ -125,12 +145,12 @@ fn another_module_starts_from_its_own_defaults() {
 
 #[test]
 fn settings_made_before_the_module_are_kept_if_it_allows_them() {
-    let mut settings = Settings::defaults();
+    let mut settings = Settings::defaults(&MODIO_02);
     settings.set(SAFE + SLOT, 2048);
     settings.set(SAFE + SLOT + 1, HOLD);
     settings.set(FILTER + SLOT, 3);
     settings.set(FILTER + SLOT + 1, 100);
-    let mut outputs = settings.clone();
+    let mut outputs = settings;
     outputs.set(MODULE_SLOT, 2);
     assert_eq!(outputs.get(SAFE + SLOT), 0, "2048 is not allowed for a bit");
     assert_eq!(outputs.get(SAFE + SLOT + 1), HOLD);

@@ -2,6 +2,7 @@
 
 extern crate std;
 
+mod fixed;
 mod module;
 mod origin;
 mod ranges;
@@ -44,7 +45,11 @@ fn write<const SLOTS: usize>(
     Ok(command)
 }
 
-fn read(config: &Config, start: u16, count: u16) -> Result<Vec<u16>, Exception> {
+fn read<const SLOTS: usize>(
+    config: &super::Config<SLOTS>,
+    start: u16,
+    count: u16,
+) -> Result<Vec<u16>, Exception> {
     let span = Span::new(start, count).unwrap();
     config.check_read(span)?;
     let mut bytes = std::vec![0xEE; usize::from(count) * 2];
@@ -241,7 +246,7 @@ fn settings_take_effect_immediately_or_after_the_restart() {
     assert_eq!((points[2].safe, points[3].safe), (None, Some(7)));
 
     save(&mut config);
-    let restarted = Config::new(&MODIO_02, config.to_save().clone(), false);
+    let restarted = Config::new(&MODIO_02, *config.to_save(), false);
     let line = LineConfig::of(&restarted.edited);
     assert_eq!(
         (line.baud, line.format, line.frame_gap),
@@ -319,7 +324,7 @@ fn unsaved_is_reported_until_the_save_is_complete_and_after_a_failure() {
     assert_eq!(write(&mut config, COMMAND, &[1]), Ok(Some(Command::Save)));
     config.begin_save();
     assert_eq!(status(&config), status::UNSAVED);
-    config.save_failed(Settings::defaults());
+    config.save_failed(Settings::defaults(&MODIO_02));
     assert_eq!(status(&config), status::UNSAVED);
     assert_eq!(read(&config, BETA, 1).unwrap(), [2000]);
     save(&mut config);
@@ -344,7 +349,11 @@ fn loading_defaults_and_dropping_changes_act_like_writes() {
     assert_ne!(config.revision(), revision);
     assert_eq!(
         all(&config),
-        all(&Config::new(&MODIO_02, Settings::defaults(), false))
+        all(&Config::new(
+            &MODIO_02,
+            Settings::defaults(&MODIO_02),
+            false
+        ))
     );
     assert_eq!(status(&config), status::UNSAVED);
     config.drop_changes();
@@ -373,11 +382,11 @@ fn every_command_is_returned_and_writing_it_changes_nothing() {
 #[test]
 fn an_invalid_store_is_reported() {
     assert_eq!(
-        Config::new(&MODIO_02, Settings::defaults(), true).status(),
+        Config::new(&MODIO_02, Settings::defaults(&MODIO_02), true).status(),
         status::STORED_INVALID
     );
     assert_eq!(
-        Config::new(&MODIO_02, Settings::defaults(), false).status(),
+        Config::new(&MODIO_02, Settings::defaults(&MODIO_02), false).status(),
         0
     );
 }

@@ -121,6 +121,6 @@ fn settings_by_point_take_effect_together_with_their_module() {
     assert_eq!(write(&mut config, FILTER + SLOT, &[1000]), DONE);
     save(&mut config);
     assert_eq!(filter(&config), None);
-    let restarted = Config::new(&MODIO_02, config.to_save().clone(), false);
+    let restarted = Config::new(&MODIO_02, *config.to_save(), false);
     assert_eq!(filter(&restarted).unwrap(), 1000);
 }

@@ -4,6 +4,7 @@ extern crate std;
 
 mod edges;
 mod files;
+mod links;
 mod over_the_air;
 mod points;
 mod state;
@@ -123,5 +124,6 @@ impl<const SLOTS: usize> Bench<SLOTS> {
         let mut channels = *self.device.points.ports()[index].channels();
         set(&mut channels);
         self.device.scanned(index, &channels, true, false);
+        (0..SLOTS).for_each(|slot| self.device.run_links(slot));
     }
 }

@@ -6,7 +6,7 @@ use modbus_line::names;
 use register_map::configuration::{BAUD, FRAME_GAP};
 use register_map::state::update;
 use register_map::update::State;
-use register_map::{edges, fault, name, radio, state};
+use register_map::{edges, fault, links, name, radio, state};
 use serde_json::{Map, Value as Json, json};
 
 use crate::bus::{Lost, decode};
@@ -36,15 +36,16 @@ const GROUPS: [&str; 7] = [
 const fn group(address: u16) -> &'static str {
     match address {
         BAUD..=FRAME_GAP | state::UNIT_ADDRESS => "line",
-        state::RESET_CAUSE..=state::STACK_FREE | state::UPDATE => "state",
+        state::RESET_CAUSE..=state::STACK_FREE | state::UPTIME_MS | state::UPDATE => "state",
         state::MODULE_IN_FORCE..state::UNIQUE_ID
         | state::CHANNEL_STATUS..fault::KIND
-        | edges::LAST_EDGE..=0x03BF => "modules",
+        | edges::LAST_EDGE..links::LINKS => "modules",
         state::BUS_MESSAGES..state::CHANNEL_STATUS | radio::BUS_MESSAGES..=radio::T15_GAPS => {
             "counters"
         }
         fault::KIND..=fault::RESERVED => "faults",
-        state::PRODUCT_CODE..=state::BOARD
+        name::NAME..=0x00DB
+        | state::PRODUCT_CODE..=state::BOARD
         | state::COMMIT..=state::DESCRIPTION_CRC
         | state::UNIQUE_ID..state::BUS_MESSAGES => "identity",
         // Firmware that is newer than this program has them.
@@ -222,7 +223,9 @@ mod tests {
             ("BAUD", "line"),
             ("p1.module_in_force", "modules"),
             ("p1.1.channel_status", "modules"),
+            ("p1.1.last_edge", "modules"),
             ("uptime", "state"),
+            ("uptime_ms", "state"),
             ("update", "state"),
             ("fault_kind", "faults"),
             ("line_repairs", "faults"),

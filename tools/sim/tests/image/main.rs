@@ -12,7 +12,7 @@
 //! | a board and its master | `bench`, `registers` |
 //! | the description | `self_description` |
 //! | the line | `noise`, `pulses`, `timing`, `silences`, `dip`, `bus` |
-//! | points | `points`, `analog_inputs`, `analog_outputs`, `dac_faults`, `counters` |
+//! | points | `points`, `analog_inputs`, `analog_outputs`, `dac_faults`, `counters`, `edges` |
 //! | configuration | `in_force`, `storing`, `saving`, `save_budget`, `flash_faults`, `power_cut` |
 //! | the simulator | `cores`: boards of one process share translated code; `programmed`: loader and image in its flash |
 //! | the radio | `radio`, `air` |
@@ -41,6 +41,7 @@ mod cores;
 mod counters;
 mod dac_faults;
 mod dip;
+mod edges;
 mod faults;
 mod flash_faults;
 mod hung_task;

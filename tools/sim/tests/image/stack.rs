@@ -8,7 +8,7 @@ use crate::bench::Bench;
 #[ignore = "needs the image: cargo xtask test"]
 fn at_least_a_kibibyte_of_stack_is_free_after_all_kinds_of_work() {
     let mut bench = Bench::set_up(Module::Ai2Ao2, &[]);
-    for address in (0x0100..0x0340).step_by(16) {
+    for address in (0x0100..0x0500).step_by(16) {
         let _ = bench.registers(address, 16);
     }
     bench.configure(0x0120, &[7; 30]);

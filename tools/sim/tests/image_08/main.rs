@@ -1,9 +1,9 @@
 //! The release image of the modio-08 on the virtual board. The image comes from `MODIO_ELF_08`, which `cargo xtask
 //! test` sets after building it.
 //!
-//! The tests of the four slots are in `slots`, `analog`, `digital` and `faults_of_slots`, those of function 70 in `fast`. The other files are those of
-//! the modio-02's tests whose result depends on the board, with one module in the first slot: start, store, timing,
-//! stack, the pins of the radio, and an update.
+//! The tests of the four slots are in `slots`, `analog`, `digital` and `faults_of_slots`, those of function 70 in `fast`,
+//! those of links in `links`. The other files are those of the modio-02's tests whose result depends on the board, with one
+//! module in the first slot: start, store, edges, timing, stack, the pins of the radio, and an update.
 
 use sim::board::{Layout, MODIO_08};
 
@@ -24,6 +24,7 @@ mod digital;
 mod fast;
 mod faults_of_slots;
 mod fitted;
+mod links;
 mod slots;
 
 #[allow(dead_code, reason = "other tests of the modio-02 use the rest")]
@@ -33,6 +34,8 @@ mod bench;
 mod boot;
 #[path = "../image/campaign.rs"]
 mod campaign;
+#[path = "../image/edges.rs"]
+mod edges;
 #[allow(dead_code, reason = "other tests of the modio-02 use the rest")]
 #[path = "../image/in_slots.rs"]
 mod in_slots;
@@ -46,6 +49,9 @@ mod radio;
 mod registers;
 #[path = "../image/saving.rs"]
 mod saving;
+#[allow(dead_code, reason = "other tests of the modio-02 use the rest")]
+#[path = "../image/self_description.rs"]
+mod self_description;
 #[path = "../image/stack.rs"]
 mod stack;
 #[path = "../image/timing.rs"]

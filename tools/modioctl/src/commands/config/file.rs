@@ -10,9 +10,9 @@ use register_map::codes::{Format, Mode};
 use register_map::configuration::{FORMAT, MODE, module_of};
 use toml::de::{DeTable, DeValue};
 
-use super::{Setting, is_module, of_modules};
+use super::{Setting, of_modules};
 use crate::failure::Failure;
-use crate::names::{Book, Item, Meaning, port_of, slots};
+use crate::names::{Book, Item, Meaning, is_module, port_of, slots};
 use crate::value::{parse, show, takes};
 
 /// Returns the text of a file.
@@ -42,6 +42,7 @@ fn comment(item: &Item, unit: &str) -> String {
     let takes = match (&item.meaning, &item.values) {
         (Meaning::Value(Value::Number(of)), Some(values)) => takes(values, of),
         (Meaning::Value(Value::Codes(_)), _) => String::new(),
+        (Meaning::Value(Value::Fields { .. }), _) => crate::listing::values(item),
         (_, Some(values)) if unit.is_empty() => takes(values, &Unit::default()),
         _ => String::new(),
     };
@@ -221,14 +222,17 @@ fn is_consistent(settings: &[Setting]) -> bool {
 #[cfg(test)]
 mod tests {
     use register_map::Module;
-    use register_map::board::MODIO_02;
+    use register_map::board::{MODIO_02, MODIO_08};
 
     use super::*;
-    use crate::names::book;
+    use crate::names::{Book, book};
 
     fn checked(text: &str) -> Result<Vec<String>, String> {
-        let unit = book(&MODIO_02, Module::None, (0, 0));
-        let settings = check(&unit, "unit.toml", text);
+        checked_for(&book(&MODIO_02, Module::None, (0, 0)), text)
+    }
+
+    fn checked_for(unit: &Book, text: &str) -> Result<Vec<String>, String> {
+        let settings = check(unit, "unit.toml", text);
         let shown = |(item, words): Setting| format!("{}={}", item.name, words[0]);
         settings
             .map(|settings| settings.into_iter().map(shown).collect())
@@ -240,6 +244,20 @@ mod tests {
         let text = "BAUD = 19_200 # rate\np5.module = '4ao'\n5.1.safe = 0xFFFF\np5.2.range = \"4-20 mA\"\n";
         let settings = ["BAUD=192", "p5.module=5", "p5.1.safe=65535", "p5.2.range=1"];
         assert_eq!(checked(text).unwrap(), settings);
+    }
+
+    #[test]
+    fn links_are_those_of_the_modules_in_the_file() {
+        let unit = book(&MODIO_08, Module::None, (0, 0));
+        let text = "p1.module = '2relay'\np1.3.link1 = 'p1.1, toggle'\np1.4.link2 = 'none'\n";
+        let settings = ["p1.module=3", "p1.3.link1=0", "p1.4.link2=65535"];
+        assert_eq!(checked_for(&unit, text).unwrap(), settings);
+        let text = "p1.module = '4di'\np1.3.link1 = 'none'";
+        let wrong = checked_for(&unit, text).unwrap_err();
+        assert!(
+            wrong.contains("line 2: p1.3.link1: no such point"),
+            "{wrong}"
+        );
     }
 
     #[test]

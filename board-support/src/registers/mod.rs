@@ -6,16 +6,25 @@
 //!
 //! | block | checked | a wrong register is |
 //! |---|---|---|
-//! | RS-485 line: USART1 with its pins, TIM2, TIM1 | one row per millisecond, while no reply is being sent | set up with its block by the caller |
+//! | RS-485 line: its UART with the pins, TIM2, TIM1, edges | one row per millisecond, while no reply is being sent | set up with its block by the caller |
 //! | clocks and resets | one row each time, and first when any other row is wrong | written |
 //! | pins, interrupts, flash | one row each time | written |
 //! | scan timer, radio | one row each time | set up with its block by the caller |
 //!
 //! A register is expected to keep what it returned after the start instead of what was written, because an emulator
 //! or a clone of the part may not keep every bit. Pins and bits that change in operation are not in the table: the
-//! DACs' bus, the levels of outputs, the pull of the radio's AUX.
+//! DACs' bus, the levels of outputs, the pull of the radio's AUX. The table follows from the board's descriptor.
 //!
 //! Everything but `record` runs from RAM, and the table lies there, too.
+
+mod table;
+
+use table::{
+    ALL, CLOCKS, DRIVER_MODES, FLASH_ACR, ICER, ISER, LINE, MAPR, MODES, NVIC, ODR, PERIPHERALS,
+    PLACES, RADIO, ROWS, SCAN_TIMER, UART_MODES,
+};
+
+use crate::boards::BOARD;
 
 /// Access to registers.
 pub trait Bus {
@@ -38,104 +47,10 @@ pub enum Wrong {
     Line,
 }
 
-const PERIPHERALS: u32 = 0x4000_0000;
-// Base addresses (RM0008 table 3, PM0056 4.3).
-const TIM2: u32 = 0x4000_0000;
-const TIM4: u32 = 0x4000_0800;
-const USART3: u32 = 0x4000_4800;
-const AFIO: u32 = 0x4001_0000;
-const GPIOA: u32 = 0x4001_0800;
-const GPIOB: u32 = 0x4001_0C00;
-const GPIOC: u32 = 0x4001_1000;
-const TIM1: u32 = 0x4001_2C00;
-const USART1: u32 = 0x4001_3800;
-const RCC: u32 = 0x4002_1000;
-const FLASH_ACR: u32 = 0x4002_2000;
-const NVIC: u32 = 0xE000_E000;
-
-// Offsets in a port (RM0008 9.2) and in the NVIC (PM0056 4.3).
-const CRL: u16 = 0x00;
-const CRH: u16 = 0x04;
-const ODR: u16 = 0x0C;
-const ISER: u16 = 0x100;
-const ICER: u16 = 0x180;
-
-/// Base address of a block, compared bits, and offsets of its registers. A mask is extended by its highest bit.
-const TABLE: [(u32, i16, &[u16]); 22] = [
-    // CFGR, APB2RSTR, APB1RSTR, AHBENR, APB2ENR, APB1ENR (RM0008 7.3).
-    (RCC, ALL, &[0x04, 0x0C, 0x10, 0x14, 0x18, 0x1C]),
-    // The pulls of the slots' lines and of RX.
-    (GPIOA, 0x4FF, &[ODR]),
-    (GPIOB, 0x003, &[ODR]),
-    (GPIOC, 0x03F, &[ODR]),
-    // The modes, without those of PB6 and PB7 and of the pins between PB2 and PB6, which are no outputs.
-    (GPIOB, 0xFFF, &[CRL]),
-    (GPIOB, ALL, &[CRH]),
-    (GPIOA, ALL, &[CRL]),
-    (GPIOA, !0xFFF, &[CRH]),
-    (GPIOC, ALL, &[CRL, CRH]),
-    // Enables, and priorities of EXTI0 to EXTI4, TIM1_CC, TIM2, TIM4, USART1 and USART3 (RM0008 table 63).
-    (
-        NVIC,
-        ALL,
-        &[ISER, ISER + 4, 0x404, 0x408, 0x418, 0x41C, 0x424],
-    ),
-    // Wait states and prefetch, without its status (PM0075 3.1).
-    (FLASH_ACR, 0x1F, &[0]),
-    // MAPR, without the debug port (RM0008 9.4.2).
-    (AFIO, 0x7FFF, &[0x04]),
-    // CR1, SMCR, DIER, PSC, ARR (RM0008 15.4).
-    (TIM4, ALL, &[0x00, 0x08, 0x0C, 0x28, 0x2C]),
-    // CR1 without TXEIE, BRR, CR2, CR3 (RM0008 27.6).
-    (USART3, !(1 << 7), &[0x0C]),
-    (USART3, ALL, &[0x08, 0x10, 0x14]),
-    // The line: BRR, CR1, CR2, CR3. The modes of PA8 to PA10.
-    (USART1, ALL, &[0x08, 0x0C, 0x10, 0x14]),
-    (GPIOA, 0xFFF, &[CRH]),
-    // CR1 without CEN, DIER without CC2IE, SMCR, CCMR1, CCMR2, CCER, PSC, ARR, CCR1, CCR2, CCR3.
-    (TIM2, !1, &[0x00]),
-    (TIM2, !(1 << 2), &[0x0C]),
-    (
-        TIM2,
-        ALL,
-        &[0x08, 0x18, 0x1C, 0x20, 0x28, 0x2C, 0x34, 0x38, 0x3C],
-    ),
-    // DIER without CC1IE and CC2IE, CR1, SMCR, CCMR1, CCMR2, CCER, PSC, ARR (RM0008 14.4).
-    (TIM1, !(0b11 << 1), &[0x0C]),
-    (TIM1, ALL, &[0x00, 0x08, 0x18, 0x1C, 0x20, 0x28, 0x2C]),
-];
-const ALL: i16 = -1;
-
-/// Number of clock and reset registers, the first rows.
-const CLOCKS: usize = 6;
-// Positions of rows: after the pulls, and the first of each block.
-const MODES: usize = 9;
-const SCAN_TIMER: usize = 24;
-const RADIO: usize = 29;
-const LINE: usize = 33;
-const ROWS: usize = 57;
 /// Number of milliseconds after which every row of the line has been checked, one in each.
 const LINE_MS: usize = ROWS - LINE;
 /// Number of rows outside the line.
 const ROUND: u8 = LINE as u8;
-
-/// Bits 2 to 17 of the address and the compared bits of every row. The peripherals do not use the range of bits 2 to
-/// 17 in which the NVIC lies.
-const PLACES: [(u16, i16); ROWS] = {
-    let mut places = [(0, 0); ROWS];
-    let (mut row, mut block) = (0, 0);
-    while block < TABLE.len() {
-        let (base, mask, offsets) = TABLE[block];
-        let mut n = 0;
-        while n < offsets.len() {
-            places[row] = (((base + offsets[n] as u32) >> 2) as u16, mask);
-            (row, n) = (row + 1, n + 1);
-        }
-        block += 1;
-    }
-    assert!(row == ROWS);
-    places
-};
 
 /// A register, its compared bits, and what it must return there.
 #[derive(Clone, Copy)]
@@ -178,7 +93,12 @@ impl Row {
             // Writing 0 to ISER does not disable an interrupt (PM0056 4.3.2).
             bus.write(address + (ICER - ISER) as u32, !self.expected);
         }
-        bus.write(address, bus.read(address) & !self.mask() | self.expected);
+        let written = if BOARD.mapr != 0 && address == MAPR {
+            BOARD.mapr & !self.mask()
+        } else {
+            bus.read(address) & !self.mask()
+        };
+        bus.write(address, written | self.expected);
     }
 }
 
@@ -207,7 +127,7 @@ impl Registers {
                 if (CLOCKS..MODES).contains(&n) {
                     row.mask &= pulled(bus, row.address() - u32::from(ODR));
                 }
-                if !line && row.address() == GPIOA + u32::from(CRH) {
+                if !line && [UART_MODES, DRIVER_MODES].contains(&row.address()) {
                     // The pins of a line that is not in use: its driver must stay off.
                     row.mask = ALL;
                 }
@@ -311,8 +231,13 @@ mod tests {
 
     use std::{collections::BTreeMap, vec::Vec};
 
-    use super::*;
+    use super::{
+        table::{RCC, TIM2, UART, USART3},
+        *,
+    };
+    use crate::pin::Port;
 
+    const PORT_A: u32 = Port::A.base();
     const APB1ENR: u32 = RCC + 0x1C;
     const ISER0: u32 = NVIC + 0x100;
 
@@ -350,7 +275,7 @@ mod tests {
             })
             .collect(),
         );
-        memory.0.insert(GPIOA, 0x3333_3338);
+        memory.0.insert(PORT_A, 0x3333_3338);
         memory.0.insert(APB1ENR, 0x5555_5555);
         memory
     }
@@ -408,7 +333,7 @@ mod tests {
         let mut memory = set_up();
         let mut registers = Registers::record(&memory, true, true);
         let mut unused = Registers::record(&memory, false, false);
-        memory.0.insert(USART1 + 0x0C, 0);
+        memory.0.insert(UART + 0x0C, 0);
         for _ in 0..ROUND {
             assert_eq!(registers.check(&mut memory, true, true), None);
         }

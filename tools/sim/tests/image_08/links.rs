@@ -1,0 +1,101 @@
+//! Times of links, without a master and while flash is erased. Inputs of ports 2 and 4 switch output 4 of port 1.
+
+use std::ops::RangeInclusive;
+
+use register_map::codes::LinkAction;
+use register_map::configuration::{COMM_TIMEOUT, FILTER};
+use register_map::links;
+use sim::{Module, Time};
+
+use crate::bench::Bench;
+use crate::fitted::{LINES, change, fitted};
+use crate::saving::{SLOWEST, large};
+
+const MODULES: [Module; 4] = [Module::Do4, Module::Di4, Module::None, Module::Di4];
+/// The point of the output.
+const LAMP: u16 = 3;
+/// Points of input 1 of port 2 and of input 2 of port 4.
+const BUTTONS: [u16; 2] = [4, 13];
+
+/// From an edge of an input to that of the output, in us: 0 to 1 ms until the scan, and the scan's work.
+const ON_TIME: RangeInclusive<u64> = 0..=2_000;
+
+/// Returns settings by which both inputs, without debounce, switch the output.
+fn linked(action: LinkAction) -> Vec<(u16, u16)> {
+    let mut settings = Vec::new();
+    for (second, button) in [(false, BUTTONS[0]), (true, BUTTONS[1])] {
+        settings.push((FILTER + button, 0));
+        let link = links::of_point(LAMP, second);
+        settings.extend([(link, button), (link + 1, action.code())]);
+    }
+    settings
+}
+
+/// Presses or releases a button. Returns the time in us until the output has changed, and its new level.
+fn press(bench: &mut Bench, (port, channel): (u8, usize), pressed: bool) -> Option<(u64, bool)> {
+    let (line, pin) = LINES[0][3];
+    bench.board.watch_pin(line, pin);
+    let now = bench.board.now();
+    let set = change(bench, port, |slot| slot.set_energised(channel, pressed));
+    set.unwrap();
+    bench.board.run_for(Time::from_ms(60));
+    let edges = bench.board.pin_edges(line, pin).iter();
+    let edges: Vec<_> = edges.filter(|(at, _)| *at > now).collect();
+    assert!(edges.len() <= 1, "the output has {} edges", edges.len());
+    edges
+        .first()
+        .map(|(at, level)| ((*at - now).as_us(), *level))
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_lamp_with_two_buttons_changes_within_2_ms() {
+    let mut bench = fitted(MODULES, &linked(LinkAction::Toggle));
+    for n in 0..12 {
+        // At any phase between two scans.
+        bench.board.run_for(Time::from_us(n * 137));
+        let button = if n % 3 == 0 { (2, 1) } else { (4, 2) };
+        let (took, level) = press(&mut bench, button, true).unwrap();
+        assert!(ON_TIME.contains(&took), "{took} us");
+        assert_eq!(level, n % 2 == 0);
+        assert_eq!(press(&mut bench, button, false), None);
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn output_follows_within_2_ms_while_the_line_is_dead() {
+    let mut settings = linked(LinkAction::FollowAlone);
+    settings.push((COMM_TIMEOUT, 1));
+    let mut bench = fitted(MODULES, &settings);
+    bench.board.run_for(Time::from_ms(200));
+    for n in 0..8 {
+        bench.board.run_for(Time::from_us(n * 137));
+        let (took, level) = press(&mut bench, (2, 1), n % 2 == 0).unwrap();
+        assert!(ON_TIME.contains(&took), "{took} us");
+        assert_eq!(level, n % 2 == 0);
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn output_follows_at_most_an_erase_later_during_a_save() {
+    let links = linked(LinkAction::Follow);
+    let mut settings = large();
+    settings.retain(|(address, _)| links.iter().all(|(own, _)| own != address));
+    settings.extend(links);
+    let mut bench = fitted(MODULES, &settings);
+    bench.board.set_flash_durations(SLOWEST);
+    // START has switched the output on.
+    assert_eq!(press(&mut bench, (2, 1), true), None);
+    let mut longest = 0;
+    for n in 0..16 {
+        bench.configure(FILTER + 7, &[10 + n]);
+        bench.write(0x0108, &[1]).unwrap();
+        bench.board.run_for(Time::from_ms(u64::from(n) * 4));
+        let (took, _) = press(&mut bench, (2, 1), n % 2 == 1).unwrap();
+        assert!(took <= ON_TIME.end() + SLOWEST.erase.as_us(), "{took} us");
+        longest = longest.max(took);
+    }
+    assert!(longest > 20_000, "no erase: {longest} us");
+}
