@@ -129,11 +129,13 @@ fn hello(board: &mut Board) -> Hello {
 }
 
 /// Returns the module in the slot of a board that has one, such as `4do`; of a board with several slots the modules by
-/// port, such as `1=4do 2=none`.
+/// port, such as `1=4do 2=none`; and the name of a board without slots.
 fn fitted(board: &Board) -> String {
     let slots: Vec<_> = board.slots().collect();
-    if let [(_, slot)] = slots[..] {
-        return slot.module().to_string();
+    match slots[..] {
+        [] => return board.layout().board.name.to_owned(),
+        [(_, slot)] => return slot.module().to_string(),
+        _ => {}
     }
     let modules = slots
         .iter()

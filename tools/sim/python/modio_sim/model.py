@@ -124,8 +124,8 @@ class State:
     dip: int
     """The DIP switch as a number."""
     address: Optional[int]
-    """The unit address in force: the DIP switch at the last power-on. None without power, when the position is no
-    address, and on a board without a switch."""
+    """The unit address in force: the DIP switch at the last power-on, or register UNIT of a board without a switch. None
+    without power, and when the position is no address."""
     module: str
     """The module in the first slot."""
     configured: str

@@ -125,7 +125,9 @@ fn write_preset(config: &Config, flash: &mut [u8]) {
             settings.push((configuration::LORA, Lora::PointsOnly.code()));
         }
         // One setting for each port, and one more: a page has room for all of them.
-        config.layout.store(flash, &settings);
+        if !settings.is_empty() {
+            config.layout.store(flash, &settings);
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! The visible state of a board, as it is in JSON: LEDs, channels, line, log, radio.
 
-use register_map::{Board as Kind, Module, update::Slot as FlashSlot};
+use register_map::{Board as Kind, Module, configuration, update::Slot as FlashSlot};
 use serde::Serialize;
 use sim::Board;
 use sim::radio::{self, Mode};
@@ -13,6 +13,9 @@ use super::bench::Bench;
 use super::faults::{Faults, HSI_HZ};
 use super::terminals::{self, Terminal};
 
+/// Value of register UNIT when none is stored.
+const UNIT: u8 = 1;
+
 /// The state of a board.
 #[derive(Serialize, ToSchema)]
 pub struct State {
@@ -23,8 +26,8 @@ pub struct State {
     powered: bool,
     #[schema(maximum = 255)]
     dip: u8,
-    /// Unit address in force: the DIP switch at the last power-on. `null` without power, for a position that is no
-    /// address, and on a board without a switch.
+    /// Unit address in force: the DIP switch at the last power-on, or register UNIT. `null` without power, and for a
+    /// position that is no address.
     #[schema(required, minimum = 1, maximum = 255)]
     address: Option<u8>,
     /// Slot of the flash whose image runs, `A` or `B`. `null` without power, in the loader, and for an image that runs
@@ -154,8 +157,8 @@ pub struct OneBoard {
     board: &'static str,
     #[schema(maximum = 255)]
     dip: u8,
-    /// Unit address in force: the DIP switch at the last power-on. `null` without power, for a position that is no
-    /// address, and on a board without a switch.
+    /// Unit address in force: the DIP switch at the last power-on, or register UNIT. `null` without power, and for a
+    /// position that is no address.
     #[schema(required, minimum = 1, maximum = 255)]
     address: Option<u8>,
     powered: bool,
@@ -323,14 +326,17 @@ fn radio(module: &radio::Module) -> Radio {
     }
 }
 
-/// Returns the unit address in force by the switch; `None` without power, without a switch, and if the switch had no
-/// valid position at power-on.
+/// Returns the unit address in force: that of the switch or, on a board without one, of register UNIT. `None` without
+/// power, and if the switch had no valid position at power-on.
 fn address(board: &Board) -> Option<u8> {
-    if board.layout().switch.is_empty() {
-        return None;
-    }
-    let dip = board.dip_at_power_on();
-    (board.powered() && matches!(dip, 1..=247 | 255)).then_some(dip)
+    let address = match board.layout().switch {
+        [] => {
+            let unit = board.layout().stored(board.flash(), configuration::UNIT);
+            unit.map_or(UNIT, |unit| unit as u8)
+        }
+        _ => board.dip_at_power_on(),
+    };
+    (board.powered() && matches!(address, 1..=247 | 255)).then_some(address)
 }
 
 /// Returns the module that the unit has stored for the slot at `port`.

@@ -6,16 +6,16 @@
 //! `F1:F103/FX3U/kicad`). The schematic has Y4 at PB0; all three firmwares switch Y4 at PB3, which is used here.
 //! The pins of `eth-io5r` are those of kinsamanka's firmware, which has no schematic.
 
+use super::Layout;
 use super::layout::{Led, Leds, LinePins};
 use super::terminals::{Kind, Terminal};
-use super::{Layout, MODIO_08};
 use f103::part::{STM32F103CB, STM32F103VC};
 use f103::soc::Pin;
-use register_map::Board;
+use register_map::board;
 
 /// Line and LEDs of the fx3u.
 const FX3U: Layout = Layout {
-    board: &register_map::board::MODIO_08,
+    board: &board::FX3U_24,
     part: STM32F103VC,
     slots: &[],
     terminals: &[],
@@ -41,21 +41,20 @@ const FX3U: Layout = Layout {
 
 /// The clone of the FX3U-14MR.
 pub const FX3U_14: Layout = Layout {
-    board: row("fx3u-14"),
+    board: &board::FX3U_14,
     terminals: &FX3U_14_TERMINALS,
     ..FX3U
 };
 
 /// The clone of the FX3U-24MR.
 pub const FX3U_24: Layout = Layout {
-    board: row("fx3u-24"),
     terminals: &FX3U_24_TERMINALS,
     ..FX3U
 };
 
 /// The board that is sold as "eth_modbus_io5r". Its Ethernet controller is held in reset.
 pub const ETH_IO5R: Layout = Layout {
-    board: row("eth-io5r"),
+    board: &board::ETH_IO5R,
     part: STM32F103CB,
     terminals: &ETH_IO5R_TERMINALS,
     line: LinePins {
@@ -75,14 +74,6 @@ pub const ETH_IO5R: Layout = Layout {
     pulled_up: &[],
     ..FX3U
 };
-
-/// Returns the row of the register map; until it has one, that of the board with the same flash.
-const fn row(name: &str) -> &'static Board {
-    match Board::named(name) {
-        Some(row) => row,
-        None => MODIO_08.board,
-    }
-}
 
 const fn terminal(name: &'static str, kind: Kind, port: char, number: usize) -> Terminal {
     Terminal {

@@ -199,6 +199,12 @@ mod tests {
     fn every_board_of_the_register_map_has_a_layout_that_matches() {
         for board in Board::ALL {
             let layout = Layout::of(board).unwrap();
+            assert_eq!(layout.switch.is_empty(), !board.switch, "{board}");
+            assert_eq!(
+                layout.terminals.is_empty(),
+                board.fixed.is_empty(),
+                "{board}"
+            );
             if layout.terminals.is_empty() {
                 let ports = layout.slots.iter().map(|slot| u16::from(slot.port));
                 assert!(ports.eq(board.ports()), "{board}");

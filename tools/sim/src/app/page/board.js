@@ -31,7 +31,9 @@ export function show(state) {
   const isNew = shown === null || shape(shown) !== shape(state);
   shown = state;
   if (isNew) byId("slots").replaceChildren(...(state.terminals ? fixed.build(state) : slotsOf(state).map(buildSlot)));
+  // Without SW01 the address is that of register UNIT.
   byId("switch").hidden = Boolean(state.terminals);
+  for (const id of ["unit-name", "unit"]) byId(id).hidden = !state.terminals;
   setText(byId("name"), state.board);
   document.title = `${state.board}, a virtual board`;
   byId("power").setAttribute("aria-checked", String(state.powered));
@@ -39,6 +41,7 @@ export function show(state) {
   byId("cycle").disabled = !state.powered;
   if (document.activeElement !== byId("dip-value")) byId("dip-value").value = state.dip;
   setText(byId("address"), addressText(state));
+  setText(byId("unit"), String(state.address ?? "-"));
   byId("address").classList.toggle("differs", state.address !== state.dip);
   [...byId("dip").children].forEach((rocker, n) =>
     rocker.setAttribute("aria-checked", String((state.dip >> n) % 2 === 1)));

@@ -34,10 +34,11 @@ function commands({ line, address: unit, ...board }) {
   if (tcp) lines.push(`modioctl --tcp ${tcp} scan`);
   if (gateway) lines.push(`modioctl --modbus-tcp ${gateway} scan`);
   if (unit === null) return lines;
-  const [slot] = slotsOf(board);
+  // A board without slots has digital inputs at port 1.
+  const { port: first, channels: [channel] } = slotsOf(board)[0] ?? { port: 1, channels: [{ kind: "di" }] };
   // Coils, or holding registers.
-  const table = ["ai", "ao"].includes(slot.channels[0].kind) ? 4 : 1;
-  const read = `-a ${unit} -0 -r ${Number(address(slot.port, 1))} -c 4 -1 -t ${table}`;
+  const table = ["ai", "ao"].includes(channel.kind) ? 4 : 1;
+  const read = `-a ${unit} -0 -r ${Number(address(first, 1))} -c 4 -1 -t ${table}`;
   const parity = { N: "none", E: "even", O: "odd" }[line.format[1]];
   if (pty) lines.push(`mbpoll -m rtu -b ${line.baud} -P ${parity} -s ${line.format[2]} ${read} ${pty}`);
   if (gateway) {
