@@ -1,0 +1,235 @@
+//! The release image of the fx3u-24 on the virtual board: what differs from the boards with slots. The image comes from
+//! `MODIO_ELF_FX3U`, the loader and the image for slot A from the variables in `FILES`, which `cargo xtask test` sets.
+//!
+//! The line, the store and the server are the same code as on the other boards, whose tests run at the corners.
+
+use std::fs;
+
+use register_map::codes::LinkAction;
+use register_map::configuration::{FILTER, UNIT};
+use register_map::layout::FLASH_BASE;
+use register_map::links;
+use register_map::name::UNIT_BY_SERIAL;
+use register_map::state;
+use sim::board::terminals::Value;
+use sim::board::{FX3U_24, Layout};
+use sim::{Config, Image, Time, chip};
+
+/// The board that the image is for.
+const LAYOUT: &Layout = &FX3U_24;
+/// The variable that names the image.
+const ELF: &str = "MODIO_ELF_FX3U";
+/// Those of the loader and of the signed image for slot A.
+const FILES: [&str; 2] = ["MODIO_LOADER_FX3U", "MODIO_A_FX3U"];
+
+#[allow(dead_code, reason = "tests of other boards use the rest")]
+#[path = "../image/bench.rs"]
+mod bench;
+
+use bench::{Bench, path};
+
+/// Points of the first channel of ports 5, 7 and 8.
+const Y0: u8 = 16;
+const Y10: u8 = 24;
+const AD0: u8 = 28;
+
+/// A board with these stored settings.
+fn board(settings: &[(u16, u16)]) -> Config {
+    let flash = LAYOUT.flash_with(settings);
+    Config {
+        chip: chip::Config::holding(flash.expect("the settings fit in the store")),
+        ..Config::default()
+    }
+}
+
+fn unit(settings: &[(u16, u16)]) -> Bench {
+    Bench::with(board(settings))
+}
+
+fn set(bench: &mut Bench, name: &str, value: Value) {
+    bench.board.set_terminal(name, value).unwrap();
+}
+
+fn relay(bench: &Bench, name: &str) -> bool {
+    bench.board.terminals().get(name) == Some(Value::Relay(true))
+}
+
+/// Returns a reading of registers.
+fn words(bench: &mut Bench, first: u16, count: u8) -> Vec<u16> {
+    let [high, low] = first.to_be_bytes();
+    let reply = bench.ask(1, &[3, high, low, 0, count]).expect("a reply");
+    assert_eq!(reply[..2], [3, 2 * count], "{reply:02X?}");
+    let words = reply[2..].chunks(2);
+    words.map(|word| u16::from_be_bytes([word[0], word[1]])).collect()
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn every_input_is_at_its_point() {
+    let mut bench = unit(&[]);
+    let names = (0..8).chain(10..16).map(|n| format!("X{n}"));
+    let inputs: Vec<_> = names.map(|name| (name, Value::Input(true))).collect();
+    let rest = bench.ask(1, &[2, 0, 0, 0, 16]).unwrap();
+    // RUN is off, and the 24 V are there.
+    assert_eq!(rest, [2, 2, 0, 0b1000_0000]);
+    for (point, (name, value)) in inputs.into_iter().enumerate() {
+        set(&mut bench, &name, value);
+        bench.board.run_for(Time::from_ms(10));
+        let reply = bench.ask(1, &[2, 0, 0, 0, 16]).unwrap();
+        let bits = u16::from_le_bytes([reply[2], reply[3]]);
+        assert_eq!(bits, 1 << point | 1 << 15, "{name}");
+        set(&mut bench, &name, Value::Input(false));
+    }
+    set(&mut bench, "RUN", Value::Switch(true));
+    set(&mut bench, "24V", Value::Supply(false));
+    bench.board.run_for(Time::from_ms(10));
+    assert_eq!(bench.ask(1, &[2, 0, 14, 0, 2]).unwrap(), [2, 1, 0b01]);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn every_relay_is_at_its_point_and_missing_ones_are_exception_02() {
+    let mut bench = unit(&[]);
+    let names = ["Y0", "Y1", "Y2", "Y3", "Y4", "Y5", "Y6", "Y7", "Y10", "Y11"];
+    for (point, name) in (Y0..).zip(names) {
+        bench.ask(1, &[5, 0, point, 0xFF, 0]).unwrap();
+        bench.board.run_for(Time::from_ms(5));
+        for other in names {
+            assert_eq!(relay(&bench, other), other == name, "{name} {other}");
+        }
+        bench.ask(1, &[5, 0, point, 0, 0]).unwrap();
+    }
+    for point in [Y10 + 2, Y10 + 3] {
+        assert_eq!(bench.ask(1, &[5, 0, point, 0xFF, 0]).unwrap(), [0x85, 2]);
+        assert_eq!(bench.ask(1, &[1, 0, point, 0, 1]).unwrap(), [0x81, 2]);
+    }
+    assert_eq!(bench.ask(1, &[6, 1, 0x10, 0, 1]).unwrap(), [0x86, 2], "MODULE");
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn analog_inputs_measure_volts_and_milliamperes() {
+    let mut bench = unit(&[(FILTER + u16::from(AD0), 0)]);
+    for (volts, milliamperes) in [(0, 0), (1_000, 4_000), (5_000, 10_000), (10_000, 20_000)] {
+        set(&mut bench, "AD0", Value::Voltage(volts));
+        set(&mut bench, "AD3", Value::Current(milliamperes));
+        bench.board.run_for(Time::from_ms(1_500));
+        let read = words(&mut bench, AD0.into(), 4);
+        // 12 bits of 10 V or 20 mA. Five codes are the tolerance of the converter at its full scale.
+        for (code, part) in [(read[0], f64::from(volts) / 10e3), (read[3], f64::from(milliamperes) / 20e3)] {
+            let expected = part * 4095.0;
+            assert!((f64::from(code) - expected).abs() <= 6.0, "{code} of {expected}");
+        }
+        assert_eq!(read[1..3], [0, 0], "AD1 and AD2");
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn analog_outputs_are_the_part_s_own_dac() {
+    let mut bench = unit(&[(0x0117, 6)]);
+    for code in [0, 410, 2048, 4095] {
+        let [high, low] = u16::to_be_bytes(code);
+        assert_eq!(bench.ask(1, &[6, 0, AD0 + 3, high, low]).unwrap()[0], 6);
+        bench.board.run_for(Time::from_ms(20));
+        let Some(Value::Output(millivolts)) = bench.board.terminals().get("DA1") else {
+            panic!("no output");
+        };
+        let expected = f64::from(code) / 4095.0 * 10_000.0;
+        assert!((f64::from(millivolts) - expected).abs() < 60.0, "{millivolts} mV of {expected}");
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn line_stays_idle_from_power_on_to_the_first_reply() {
+    let mut flash = vec![0xFF; LAYOUT.part.flash as usize];
+    let [slot, _] = LAYOUT.board.layout().slots;
+    let image = fs::read(path(FILES[1])).expect("the image can be read");
+    let at = (slot - FLASH_BASE) as usize;
+    flash[at..at + image.len()].copy_from_slice(&image);
+    let loader = Image::read(&path(FILES[0])).expect("the loader can be read");
+    let config = Config {
+        chip: chip::Config::holding(flash),
+        ..Config::default()
+    };
+    let mut bench = Bench::of(&loader, config);
+    // The loader's reset after the check of the image.
+    bench.tolerant = true;
+    let begin = bench.board.now();
+    bench.board.run_for(Time::from_ms(4_500));
+    // Until the first instructions of the loader the board's resistor switches the driver on, with an idle TX.
+    let on: Vec<_> = bench.board.line().driver_edges().filter(|(at, on)| *on && *at > begin + Time::from_us(100)).collect();
+    assert_eq!(on, [], "the driver was on");
+    assert_eq!(bench.board.line().take_received(), []);
+    let now = bench.board.now();
+    assert_eq!(bench.board.driver_enable(), false, "{now}");
+    assert_eq!(bench.ask(1, &[2, 0, 0, 0, 1]).unwrap(), [2, 1, 0]);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn line_stays_idle_without_a_valid_image() {
+    let flash = vec![0xFF; LAYOUT.part.flash as usize];
+    let loader = Image::read(&path(FILES[0])).expect("the loader can be read");
+    let config = Config {
+        chip: chip::Config::holding(flash),
+        ..Config::default()
+    };
+    let mut bench = Bench::of(&loader, config);
+    bench.tolerant = true;
+    let begin = bench.board.now();
+    bench.board.run_for(Time::from_secs(5));
+    let edges = bench.board.line().driver_edges();
+    let on: Vec<_> = edges.filter(|(at, on)| *on && *at > begin + Time::from_us(100)).collect();
+    assert_eq!((on.len(), bench.board.driver_enable()), (0, false));
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn address_is_set_by_serial_number_and_kept() {
+    let mut bench = unit(&[]);
+    let serial = words(&mut bench, state::SERIAL_NUMBER, 2);
+    let serial: Vec<u8> = serial.into_iter().flat_map(u16::to_be_bytes).collect();
+    let [high, low] = UNIT_BY_SERIAL.to_be_bytes();
+    let request = [&[0xFD, 0x46, 8][..], &serial, &[6, high, low, 0, 42]].concat();
+    let reply = bench.exchange(&bench::adu(&request));
+    let expected = [&[0xFD, 0x46, 9][..], &serial, &[6, high, low, 0, 42]].concat();
+    assert_eq!(reply.get(reply.len().saturating_sub(15)..), Some(&bench::adu(&expected)[..]));
+    bench.assert_answers(42);
+    assert_eq!(bench.ask(1, &[2, 0, 0, 0, 1]), None);
+    assert_eq!(bench.ask(42, &[6, high, low, 0, 43]).unwrap(), [0x86, 2], "to the unit address");
+    bench.board.run_for(Time::from_ms(500));
+    bench.board.cycle();
+    bench.board.run_for(Time::from_ms(200));
+    bench.assert_answers(42);
+    let [high, low] = UNIT.to_be_bytes();
+    assert_eq!(bench.ask(42, &[3, high, low, 0, 1]).unwrap(), [3, 2, 0, 42]);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn run_switch_moved_twice_after_power_on_starts_recovery() {
+    let mut bench = Bench::with(board(&[(UNIT, 9), (0x0101, 192)]));
+    bench.tolerant = true;
+    for on in [true, false] {
+        bench.board.run_for(Time::from_ms(500));
+        set(&mut bench, "RUN", Value::Switch(on));
+    }
+    bench.board.run_for(Time::from_ms(500));
+    bench.assert_answers(255);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn button_switches_a_lamp_without_a_master() {
+    let link = links::of_point(Y0.into(), false);
+    let mut bench = unit(&[(link, 0), (link + 1, LinkAction::Toggle.code())]);
+    for lit in [true, false] {
+        for pressed in [true, false] {
+            set(&mut bench, "X0", Value::Input(pressed));
+            bench.board.run_for(Time::from_ms(20));
+            assert_eq!(relay(&bench, "Y0"), lit);
+        }
+    }
+}
