@@ -5,7 +5,7 @@ use core::ops::Range;
 use core::str::FromStr;
 
 use crate::layout::{Layout, TwoPages};
-use crate::part::{KIB, Part, STM32F103C8, STM32F103CB, STM32F103RC};
+use crate::part::{KIB, Part, STM32F103C8, STM32F103CB, STM32F103RC, STM32F103VC};
 use crate::{BLOCKS, Block, links, points};
 
 /// A board that the firmware is built for.
@@ -62,7 +62,15 @@ struct Row {
     memory: Memory,
 }
 
-const ROWS: [Row; 3] = [
+const FX3U: Memory = Memory {
+    part: STM32F103VC,
+    smaller: None,
+    stack: 11 * KIB,
+    budget: [66 * KIB, 20 * KIB],
+    interrupts: ["UART4", "USART1", "EXTI3"],
+};
+
+const ROWS: [Row; 5] = [
     // The LLD-ModbusIO-02 with an STM32F103CB, or a C8 on a "Blue Pill": one slot, port 5.
     Row {
         name: "modio-02",
@@ -92,6 +100,24 @@ const ROWS: [Row; 3] = [
             budget: [63 * KIB, 14 * KIB],
             interrupts: ["USART1", "USART3", "EXTI3"],
         },
+    },
+    // The clone of Mitsubishi's FX3U-14MR with an STM32F103VC: fixed inputs and outputs at ports 1 to 7.
+    Row {
+        name: "fx3u-14",
+        code: 3,
+        model: "FX3U-14MR",
+        first_port: 1,
+        slots: 7,
+        memory: FX3U,
+    },
+    // The clone of the FX3U-24MR: the same with more of them, at ports 1 to 8.
+    Row {
+        name: "fx3u-24",
+        code: 4,
+        model: "FX3U-24MR",
+        first_port: 1,
+        slots: 8,
+        memory: FX3U,
     },
     // The "eth_modbus_io5r" with an STM32F103CB: fixed inputs and relays at ports 1 to 4.
     Row {
@@ -128,12 +154,16 @@ impl Row {
 pub const MODIO_02: Board = ROWS[0].board();
 /// The modio-08.
 pub const MODIO_08: Board = ROWS[1].board();
+/// The fx3u-14.
+pub const FX3U_14: Board = ROWS[2].board();
+/// The fx3u-24.
+pub const FX3U_24: Board = ROWS[3].board();
 /// The eth-io5r.
-pub const ETH_IO5R: Board = ROWS[2].board();
+pub const ETH_IO5R: Board = ROWS[4].board();
 
 impl Board {
     /// All boards, in the order of their codes.
-    pub const ALL: [&'static Self; 3] = [&MODIO_02, &MODIO_08, &ETH_IO5R];
+    pub const ALL: [&'static Self; 5] = [&MODIO_02, &MODIO_08, &FX3U_14, &FX3U_24, &ETH_IO5R];
 
     /// Every code of register BOARD with the board's name.
     pub const NAMES: [(u16, &'static str); Self::ALL.len()] = {
@@ -268,7 +298,7 @@ mod tests {
         let error = "nucleo".parse::<&Board>().unwrap_err();
         assert_eq!(
             error.to_string(),
-            "not a board; one of modio-02, modio-08, eth-io5r"
+            "not a board; one of modio-02, modio-08, fx3u-14, fx3u-24, eth-io5r"
         );
     }
 

@@ -39,6 +39,12 @@ pub const STM32F103CB: Part = Part {
     interrupts: 43,
 };
 
+/// High density, 100 pins (DS5792 table 2).
+pub const STM32F103VC: Part = Part {
+    name: "STM32F103VC",
+    ..STM32F103RC
+};
+
 /// High density (DS5792 table 2).
 pub const STM32F103RC: Part = Part {
     name: "STM32F103RC",

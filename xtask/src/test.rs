@@ -434,7 +434,7 @@ mod tests {
         let host = names(&[], Host).unwrap();
         assert_eq!(
             host[..4],
-            ["unit", "image-02", "image-08", "image-eth-io5r"]
+            ["unit", "image-02", "image-08", "image-fx3u-14"]
         );
         let test = names(&[], Test).unwrap();
         assert!(host.iter().all(|name| test.contains(name)) && !test.contains(&"fuzz".to_owned()));

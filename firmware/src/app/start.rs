@@ -103,7 +103,7 @@ pub fn up(
     let on_wire = wire_settings(settings);
 
     let mut sampler = board.sampler;
-    let (modules, analog_outputs) = install(installed, &mut sampler, board.dacs);
+    let (modules, analog_outputs) = install(installed, &mut sampler, board.dacs, board.own_dac);
     let serial_number = if HAS_EVENTS {
         start_up::serial_number(board.unique_id, config.serial_low())
     } else {
