@@ -7,6 +7,9 @@
 /// The device serves function 70.
 pub const HAS_EVENTS: bool = !cfg!(feature = "small");
 
+/// The board has slots, a switch and a radio: nothing about it is fixed.
+pub const HAS_SLOTS: bool = cfg!(feature = "slots");
+
 pub mod alive;
 mod built;
 pub mod byte_queue;

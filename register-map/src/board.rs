@@ -4,9 +4,11 @@ use core::fmt;
 use core::ops::Range;
 use core::str::FromStr;
 
+use crate::fixed::FixedPort;
+use crate::kind::Kind;
 use crate::layout::{Layout, TwoPages};
 use crate::part::{KIB, Part, STM32F103C8, STM32F103CB, STM32F103RC, STM32F103VC};
-use crate::{BLOCKS, Block, links, points};
+use crate::{BLOCKS, Module, Rule, Text, configuration, links, points};
 
 /// A board that the firmware is built for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,10 +19,16 @@ pub struct Board {
     pub code: u16,
     /// Model name in the device identification: the product that the board replaces, if there is one.
     pub model: &'static str,
-    /// First port with a slot, 1 to 8.
+    /// First port with points, 1 to 8.
     pub first_port: u16,
-    /// Number of consecutive ports with a slot, 1 to 8. All other ports have none.
+    /// Number of consecutive ports with points, 1 to 8. All other ports have none.
     pub slots: u16,
+    /// The ports in their order, if their inputs and outputs are part of the board. Empty for a board with slots.
+    pub fixed: &'static [FixedPort],
+    /// A switch has the unit address. Without it register UNIT has.
+    pub switch: bool,
+    /// The second line is a LoRa radio.
+    pub radio: bool,
     /// Flash pages that store the configuration, while the application runs without a loader.
     pub store: TwoPages,
 }
@@ -59,16 +67,11 @@ struct Row {
     model: &'static str,
     first_port: u16,
     slots: u16,
+    fixed: &'static [FixedPort],
+    switch: bool,
+    radio: bool,
     memory: Memory,
 }
-
-const FX3U: Memory = Memory {
-    part: STM32F103VC,
-    smaller: None,
-    stack: 11 * KIB,
-    budget: [66 * KIB, 20 * KIB],
-    interrupts: ["UART4", "USART1", "EXTI3"],
-};
 
 const ROWS: [Row; 5] = [
     // The LLD-ModbusIO-02 with an STM32F103CB, or a C8 on a "Blue Pill": one slot, port 5.
@@ -78,6 +81,9 @@ const ROWS: [Row; 5] = [
         model: "LLD-ModbusIO-02",
         first_port: 5,
         slots: 1,
+        fixed: &[],
+        switch: true,
+        radio: true,
         memory: Memory {
             part: STM32F103CB,
             smaller: Some(STM32F103C8),
@@ -93,6 +99,9 @@ const ROWS: [Row; 5] = [
         model: "modio-08",
         first_port: 1,
         slots: 4,
+        fixed: &[],
+        switch: true,
+        radio: true,
         memory: Memory {
             part: STM32F103RC,
             smaller: None,
@@ -101,31 +110,76 @@ const ROWS: [Row; 5] = [
             interrupts: ["USART1", "USART3", "EXTI3"],
         },
     },
-    // The clone of Mitsubishi's FX3U-14MR with an STM32F103VC: fixed inputs and outputs at ports 1 to 7.
+    // The FX3U-14MR's clone: an STM32F103VC.
     Row {
         name: "fx3u-14",
         code: 3,
         model: "FX3U-14MR",
         first_port: 1,
         slots: 7,
-        memory: FX3U,
+        fixed: &[
+            FixedPort::new(Module::Di4, 4),
+            FixedPort::new(Module::Di4, 4),
+            FixedPort::new(Module::Do4, 4),
+            FixedPort::new(Module::Do4, 2),
+            FixedPort::new(Module::Ai4, 4).currents(0b1000),
+            FixedPort::new(Module::Ai4, 4).currents(0b0011),
+            FixedPort::new(Module::Ao4, 2),
+        ],
+        switch: false,
+        radio: false,
+        memory: Memory {
+            part: STM32F103VC,
+            smaller: None,
+            stack: 11 * KIB,
+            budget: [68 * KIB, 20 * KIB],
+            interrupts: ["UART4", "USART1", "EXTI3"],
+        },
     },
-    // The clone of the FX3U-24MR: the same with more of them, at ports 1 to 8.
+    // The FX3U-24MR's clone: an STM32F103VC.
     Row {
         name: "fx3u-24",
         code: 4,
         model: "FX3U-24MR",
         first_port: 1,
         slots: 8,
-        memory: FX3U,
+        fixed: &[
+            FixedPort::new(Module::Di4, 4),
+            FixedPort::new(Module::Di4, 4),
+            FixedPort::new(Module::Di4, 4),
+            FixedPort::new(Module::Di4, 4),
+            FixedPort::new(Module::Do4, 4),
+            FixedPort::new(Module::Do4, 4),
+            FixedPort::new(Module::Do4, 2),
+            FixedPort::new(Module::Ai4, 4)
+                .currents(0b1000)
+                .or(Module::Ai2Ao2),
+        ],
+        switch: false,
+        radio: false,
+        memory: Memory {
+            part: STM32F103VC,
+            smaller: None,
+            stack: 11 * KIB,
+            budget: [68 * KIB, 20 * KIB],
+            interrupts: ["UART4", "USART1", "EXTI3"],
+        },
     },
-    // The "eth_modbus_io5r" with an STM32F103CB: fixed inputs and relays at ports 1 to 4.
+    // The "eth_modbus_io5r": an STM32F103CB.
     Row {
         name: "eth-io5r",
         code: 5,
         model: "eth_modbus_io5r",
         first_port: 1,
         slots: 4,
+        fixed: &[
+            FixedPort::new(Module::Di4, 4),
+            FixedPort::new(Module::Di4, 2),
+            FixedPort::new(Module::Do4, 4),
+            FixedPort::new(Module::Do4, 1),
+        ],
+        switch: false,
+        radio: false,
         memory: Memory {
             part: STM32F103CB,
             smaller: None,
@@ -145,6 +199,9 @@ impl Row {
             model: self.model,
             first_port: self.first_port,
             slots: self.slots,
+            fixed: self.fixed,
+            switch: self.switch,
+            radio: self.radio,
             store: TwoPages::before(part.flash, &part),
         }
     }
@@ -214,27 +271,70 @@ impl Board {
         None
     }
 
-    /// Returns the ports with a slot, in ascending order.
+    /// Returns the ports with points, in ascending order.
     #[must_use]
     pub const fn ports(&self) -> Range<u16> {
         self.first_port..self.first_port + self.slots
     }
 
-    /// Iterates over the blocks of registers of the board, in ascending order of the addresses.
-    pub fn blocks(&self) -> impl Iterator<Item = &'static Block> + use<> {
-        let has_links = links::exist(self.slots.into());
-        let blocks = BLOCKS.into_iter();
-        blocks.filter(move |block| has_links || block.first != links::LINKS)
+    /// Iterates over the registers of the board besides the points, or runs of similar ones, with their texts, in
+    /// ascending order of the addresses.
+    pub fn registers(&self) -> impl Iterator<Item = (&'static Rule, &'static Text)> {
+        let blocks = BLOCKS.iter().skip(1);
+        let registers = blocks.flat_map(|block| block.registers());
+        registers.filter(|(rule, _)| self.has(rule.first))
     }
 
-    /// Returns whether a port has a slot.
+    /// Returns whether the board has a register, which every board has or every board of some kind. Links exist only for
+    /// some of the points.
+    #[must_use]
+    pub const fn has(&self, address: u16) -> bool {
+        match address {
+            configuration::UNIT => !self.switch,
+            configuration::LORA..=configuration::LORA_FRAME_GAP => self.radio,
+            _ => links::exist(self.slots as usize) || !links::contain(address),
+        }
+    }
+
+    /// Returns the port with this number, 1 to 8, if its inputs and outputs are part of the board.
+    #[must_use]
+    pub fn fixed(&self, port: u16) -> Option<&'static FixedPort> {
+        self.fixed
+            .get(usize::from(port.wrapping_sub(self.first_port)))
+    }
+
+    /// Returns whether MODULE of a port, 1 to 8, can be written.
+    #[must_use]
+    pub fn chooses(&self, port: u16) -> bool {
+        self.fixed.is_empty() || self.fixed(port).is_some_and(|port| port.or.is_some())
+    }
+
+    /// Returns whether MODULE of a port, 1 to 8, may have this value. A port without points has no module.
+    #[must_use]
+    pub fn takes(&self, port: u16, code: u16) -> bool {
+        match self.fixed(port) {
+            Some(fixed) => fixed.takes(code),
+            None => code == 0 || self.fixed.is_empty() && self.has_slot(port),
+        }
+    }
+
+    /// Returns the kinds of the points of a port, 1 to 8, with this module.
+    #[must_use]
+    pub fn kinds(&self, port: u16, module: Module) -> [Kind; 4] {
+        match self.fixed(port) {
+            Some(fixed) => fixed.kinds(module),
+            None => module.points(),
+        }
+    }
+
+    /// Returns whether a port has points.
     #[inline]
     #[must_use]
     pub const fn has_slot(&self, port: u16) -> bool {
         port.wrapping_sub(self.first_port) < self.slots
     }
 
-    /// Returns the addresses of the points of all ports with a slot.
+    /// Returns the addresses of the points of all ports.
     #[must_use]
     pub const fn points(&self) -> Range<u16> {
         let first = points::of_port(self.first_port);

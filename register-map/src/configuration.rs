@@ -71,6 +71,8 @@ block! {
     COMMAND "COMMAND": 0x0108 x 1, Value::Codes(Command::NAMES), Rule::now(Values::OneOf(Command::CODES), 0);
     /// Requests that restart COMM_TIMEOUT
     COMM_SOURCE "COMM_SOURCE": 0x0109 x 1, Value::Codes(CommSource::NAMES), Rule::now(Values::up_to(3), 0);
+    /// Unit address of a board without switch
+    UNIT "UNIT": 0x010A x 1, Value::NUMBER, Rule::restart(Values::range(1, 247), 1);
     /// Low word of the serial number; 0 = from the unique identity
     SERIAL_LOW "SERIAL_LOW": 0x010B x 1, Value::NUMBER, Rule::restart(Values::ANY, 0);
     /// Module in the slot

@@ -32,6 +32,7 @@ pub mod configuration;
 pub mod counters;
 pub mod edges;
 pub mod fault;
+mod fixed;
 mod kind;
 pub mod layout;
 pub mod limits;
@@ -52,6 +53,7 @@ mod values;
 pub use block::{Block, Scope, Text};
 pub use board::Board;
 pub use commit::first_32_bits;
+pub use fixed::FixedPort;
 #[doc(hidden)]
 pub use git_version::git_version;
 pub use module::{Module, UnknownModule};

@@ -39,7 +39,7 @@ pub const STM32F103CB: Part = Part {
     interrupts: 43,
 };
 
-/// High density, 100 pins (DS5792 table 2).
+/// High density (DS5792 table 2).
 pub const STM32F103VC: Part = Part {
     name: "STM32F103VC",
     ..STM32F103RC

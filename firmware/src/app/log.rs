@@ -58,6 +58,9 @@ const CAUSES: [&str; 6] = [
     "pin",
 ];
 
+/// Text for a module that fails as a whole.
+const SILENT: &str = "the module does not answer";
+
 /// Bytes that a line may have, including its end. Text that does not fit is dropped.
 const LONGEST: usize = 96;
 
@@ -143,7 +146,7 @@ impl Log {
             let text = if start.faults.crystal_faults < CRYSTAL_FAULTS {
                 "WARN the crystal did not start: internal oscillator"
             } else {
-                "WARN the crystal failed twice: internal oscillator until power-on"
+                "WARN the crystal failed twice: it is off until power-on"
             };
             self.write(&mut Line::of(text));
         }
@@ -179,17 +182,17 @@ impl Log {
                         let channel = channel as u32 + 1;
                         line.text("channel ").number(channel).text(" fails")
                     }
-                    None => line.text("the module does not answer"),
+                    None => line.text(SILENT),
                 }
             }
             Event::ModuleGood(port) => line.slot(port).text("the module works again"),
             Event::CommunicationLost => line.text("WARN communication lost: outputs go to SAFE"),
             Event::Saved => line.text("configuration saved"),
             Event::SaveFailed => line.text("WARN the flash could not be written"),
-            Event::LineRepaired => line.text("WARN line: set up again after a disturbance"),
+            Event::LineRepaired => line.text("WARN line: set up again"),
             Event::Radio(true) => line.text("radio: ready"),
-            Event::Radio(false) => line.text("WARN radio: the module does not answer"),
-            Event::LowSupply => line.text("WARN the supply is too low: the flash has to wait"),
+            Event::Radio(false) => line.text("WARN radio: ").text(SILENT),
+            Event::LowSupply => line.text("WARN the supply is too low for the flash"),
         });
     }
 

@@ -32,21 +32,22 @@ use core::array;
 use modbus_server::{Exception, Span, Words, WordsOut};
 use register_map::codes::{CommSource, Command, Lora};
 use register_map::configuration::{
-    COMM_SOURCE, COMM_TIMEOUT, COMMAND, FILTER, FORMAT, KEY, LORA, MODE, MODULE, RESPONSE_DELAY,
-    RULES, SAVES, SERIAL_LOW,
+    COMM_SOURCE, COMM_TIMEOUT, COMMAND, FILTER, FORMAT, KEY, LORA, LORA_FRAME_GAP, MODE, MODULE,
+    RANGE, RESPONSE_DELAY, RULES, SAVES, SERIAL_LOW, UNIT,
 };
 use register_map::points;
 use register_map::state::status;
 use register_map::{Board, Module, Run, Runs, links as links_map, runs};
 
+use crate::HAS_SLOTS;
 pub use in_force::{LineConfig, Point, RadioConfig};
 use links::Links;
 use lock::Lock;
 pub use origin::{LineName, Origin};
 use saves::Saves;
 pub use settings::RestartValues;
-pub use settings::Settings;
-use settings::{RESTARTS, format_suits_mode, takes_module};
+use settings::{RESTARTS, format_suits_mode, port_of, restart_addresses, takes_module};
+pub use settings::{Settings, kinds};
 
 /// How far a save is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -175,13 +176,27 @@ impl<const SLOTS: usize> Config<SLOTS> {
     ///
     /// # Errors
     ///
-    /// Exception 02 when the span contains a gap.
+    /// Exception 02 when the span contains a gap, or a register that the board does not have.
     pub fn check_read(&self, span: Span) -> Result<(), Exception> {
         match runs(RULES, span.start(), span.count()) {
             _ if Links::<SLOTS>::contain(span.start()) => self.check_links(span),
-            Some(_) => Ok(()),
-            None => Err(Exception::IllegalDataAddress),
+            Some(_) if self.has(span) => Ok(()),
+            _ => Err(Exception::IllegalDataAddress),
         }
+    }
+
+    /// Returns whether the board has these registers, which are not in a gap.
+    fn has(&self, span: Span) -> bool {
+        let has = |first: u16, last: u16| u32::from(first) < span.end() && span.start() <= last;
+        let lacks_unit = HAS_SLOTS || self.board.switch;
+        let has_radio = HAS_SLOTS || self.board.radio;
+        !(lacks_unit && has(UNIT, UNIT)) && (has_radio || !has(LORA, LORA_FRAME_GAP))
+    }
+
+    /// Returns whether the board has these registers, and lets them be written.
+    fn lets_write(&self, span: Span) -> bool {
+        let fixed = |address| port_of(address).is_some_and(|port| !self.board.chooses(port));
+        self.has(span) && (HAS_SLOTS || !span.addresses().any(fixed))
     }
 
     /// Appends every register of a span that [`Self::check_read`] has accepted.
@@ -202,7 +217,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
     ///
     /// # Errors
     ///
-    /// The first that applies: 02 for a gap; 03 for a value that is not allowed, including a setting by point that
+    /// The first that applies: 02 for a gap, or for a MODULE that is part of the board; 03 for a value that is not allowed, including a setting by point that
     /// the module chosen last does not allow, and a FORMAT with seven data bits in RTU mode; 06 for a broadcast over
     /// the air or a line that may not write here, when the lock is closed for the line and the request does not write
     /// KEY alone, or when a save is ordered before the previous one is complete or with nothing left of the budget.
@@ -212,6 +227,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
             self.suits_the_links(span, words)
         } else {
             let runs = runs(RULES, span.start(), span.count());
+            let runs = runs.filter(|_| self.lets_write(span));
             let runs = runs.ok_or(Exception::IllegalDataAddress)?;
             self.suit(runs, words) && self.suits_the_mode(span, words)
         };
@@ -266,6 +282,13 @@ impl<const SLOTS: usize> Config<SLOTS> {
                 .zip(words.iter())
                 .all(|(index, code)| takes_module(self.board, index.wrapping_add(1), code));
         }
+        if !HAS_SLOTS && run.rule.first == RANGE {
+            let addresses = RANGE.wrapping_add(run.index)..;
+            let mut ranges = addresses.zip(words.iter());
+            if !ranges.all(|(address, range)| self.edited.takes_range(address, range)) {
+                return false;
+            }
+        }
         let Some(narrower) = run.rule.narrower else {
             return true;
         };
@@ -275,7 +298,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
             if first >= run.index.wrapping_add(run.count) {
                 return true;
             }
-            let kinds = self.edited.module(port).points();
+            let kinds = kinds(self.board, port, self.edited.module(port));
             (first..).zip(kinds).all(|(point, kind)| {
                 kind != narrower.kind
                     || words
@@ -330,6 +353,42 @@ impl<const SLOTS: usize> Config<SLOTS> {
             self.save = Save::Ordered;
         }
         command
+    }
+
+    /// Checks whether the unit address may be written by serial number.
+    ///
+    /// # Errors
+    ///
+    /// Exception 02 on a board with a switch, and in a request to the unit address; 03 for a value that is not a unit
+    /// address; 06 while a save is under way, or when nothing is left of the budget.
+    pub fn check_unit(&self, unit: Option<u16>) -> Result<(), Exception> {
+        if HAS_SLOTS || self.board.switch || !self.origin.by_serial {
+            return Err(Exception::IllegalDataAddress);
+        }
+        match unit {
+            Some(unit) if !(1..=247).contains(&unit) => Err(Exception::IllegalDataValue),
+            Some(unit)
+                if !self.has_save() && (self.saves.left() > 0 || unit == self.saved.get(UNIT)) =>
+            {
+                Ok(())
+            }
+            _ => Err(Exception::ServerDeviceBusy),
+        }
+    }
+
+    /// Sets the unit address, which [`Self::check_unit`] has accepted, and begins a save of this alone.
+    pub fn set_unit(&mut self, unit: u16) {
+        self.edited.set(UNIT, unit);
+        if self.saved.get(UNIT) != unit {
+            self.saved.set(UNIT, unit);
+            self.save = Save::Begun;
+        }
+        for (started, address) in self.started.iter_mut().zip(restart_addresses()) {
+            if address == UNIT {
+                *started = unit;
+            }
+        }
+        self.revision = self.revision.wrapping_add(1);
     }
 
     /// Compares the edited settings with the others after [`revision`](Self::revision) has changed, before

@@ -1,11 +1,15 @@
 //! The value of every setting.
 
+use modio_drivers::CHANNELS;
 use register_map::codes::{Format, Mode};
-use register_map::configuration::{self, COMMAND, FORMAT, KEY, MODE, MODULE, RULES};
+use register_map::configuration::{
+    self, COMMAND, FORMAT, KEY, MODE, MODULE, RANGE, RULES, module_of,
+};
 use register_map::points::{self, Kind};
 use register_map::{Board, InForce, Module, Rule, links, rule_at};
 
 use super::links::Links;
+use crate::HAS_SLOTS;
 
 /// High byte of every configuration address. The low byte is the index in [`Settings`].
 const PAGE: u16 = KEY >> 8;
@@ -26,19 +30,27 @@ pub struct RestartValues(pub(super) [u16; RESTARTS]);
 pub struct Settings<const SLOTS: usize> {
     /// Indexed by the low byte of the address. KEY, COMMAND and gaps hold 0.
     values: [u16; 256],
+    board: &'static Board,
     pub(super) links: Links<SLOTS>,
 }
 
 impl<const SLOTS: usize> Settings<SLOTS> {
     /// Returns the factory settings of a board.
     #[must_use]
-    pub fn defaults(board: &Board) -> Self {
+    pub fn defaults(board: &'static Board) -> Self {
         let mut settings = Self {
             values: [0; 256],
+            board,
             links: Links::new(board.points().start),
         };
         for (rule, address) in Addresses::from(KEY) {
             settings.put(address, rule.default);
+        }
+        if !HAS_SLOTS {
+            for (port, fixed) in board.ports().zip(board.fixed) {
+                settings.put(module_of(port), fixed.module.code());
+                settings.set_ranges(port);
+            }
         }
         settings
     }
@@ -46,7 +58,7 @@ impl<const SLOTS: usize> Settings<SLOTS> {
     /// Returns the settings from a record's pairs of address and value, in ascending order, and the number of values that
     /// this board does not allow and that have their default instead. Unknown addresses are ignored.
     #[must_use]
-    pub fn load(board: &Board, pairs: impl Iterator<Item = (u16, u16)>) -> (Self, u16) {
+    pub fn load(board: &'static Board, pairs: impl Iterator<Item = (u16, u16)>) -> (Self, u16) {
         let mut settings = Self::defaults(board);
         let mut rejected: u16 = 0;
         // Pairs are in ascending order. So the modules, which determine which settings by point are allowed, come before
@@ -58,6 +70,7 @@ impl<const SLOTS: usize> Settings<SLOTS> {
                     let port = port_of(address);
                     rule.values_for(settings.kind_at(address)).allow(value)
                         && port.is_none_or(|port| takes_module(board, port, value))
+                        && settings.takes_range(address, value)
                 }
                 None if Links::<SLOTS>::contain(address) => settings.has_link(address),
                 None => continue,
@@ -98,8 +111,7 @@ impl<const SLOTS: usize> Settings<SLOTS> {
     /// Returns the module chosen for a port, 1 to 8.
     #[must_use]
     pub fn module(&self, port: u16) -> Module {
-        let address = MODULE.wrapping_add(port.wrapping_sub(1));
-        Module::from_code(self.get(address)).unwrap_or(Module::None)
+        Module::from_code(self.get(module_of(port))).unwrap_or(Module::None)
     }
 
     /// Returns the kind of a point with the chosen module; none above 31.
@@ -108,7 +120,8 @@ impl<const SLOTS: usize> Settings<SLOTS> {
         if point >= points::COUNT {
             return Kind::None;
         }
-        let kinds = self.module(point / points::CHANNELS + 1).points();
+        let port = point / points::CHANNELS + 1;
+        let kinds = kinds(self.board, port, self.module(port));
         let channel = usize::from(point % points::CHANNELS);
         kinds.get(channel).copied().unwrap_or(Kind::None)
     }
@@ -160,9 +173,7 @@ impl<const SLOTS: usize> Settings<SLOTS> {
 
     /// Returns the settings that need a restart, in the order of their addresses.
     pub(super) fn restart_values(&self) -> impl Iterator<Item = u16> {
-        Addresses::from(KEY)
-            .filter(|(rule, _)| rule.in_force == InForce::Restart)
-            .map(|(_, address)| self.get(address))
+        restart_addresses().map(|address| self.get(address))
     }
 
     /// Returns the kind of the point of a setting by point, or none for other settings.
@@ -180,7 +191,7 @@ impl<const SLOTS: usize> Settings<SLOTS> {
         if after == before {
             return;
         }
-        self.put(MODULE.wrapping_add(port.wrapping_sub(1)), code);
+        self.put(module_of(port), code);
         // The settings by point, see `point_of`.
         let rules = RULES.iter().filter(|rule| rule.count == points::COUNT);
         for rule in rules {
@@ -196,7 +207,35 @@ impl<const SLOTS: usize> Settings<SLOTS> {
                 }
             }
         }
+        if !HAS_SLOTS {
+            self.set_ranges(port);
+        }
         self.drop_links(Some(self.links.slot_of(first)));
+    }
+
+    /// Sets RANGE of the points of a port of the board to the only value that each takes.
+    fn set_ranges(&mut self, port: u16) {
+        for point in (points::of_port(port)..).take(CHANNELS) {
+            if let Some(range) = self.only_range(point) {
+                self.put(RANGE.wrapping_add(point), range);
+            }
+        }
+    }
+
+    /// Returns the only value of RANGE of an analog point that is part of the board.
+    fn only_range(&self, point: u16) -> Option<u16> {
+        let fixed = self.board.fixed(point / points::CHANNELS + 1)?;
+        let kind = self.kind(point);
+        matches!(kind, Kind::WordInput | Kind::WordOutput)
+            .then(|| fixed.range(point % points::CHANNELS, kind))
+    }
+
+    /// Returns whether the board allows a value, if it is one of RANGE.
+    pub(super) fn takes_range(&self, address: u16, value: u16) -> bool {
+        let point = address.wrapping_sub(RANGE);
+        HAS_SLOTS
+            || point >= points::COUNT
+            || self.only_range(point).is_none_or(|only| value == only)
     }
 
     fn put(&mut self, address: u16, value: u16) {
@@ -222,9 +261,22 @@ pub(super) fn format_suits_mode(format: u16, mode: u16) -> bool {
     }
 }
 
-/// Returns whether a port's MODULE may have this value. A port without a slot has no module.
-pub(super) const fn takes_module(board: &Board, port: u16, code: u16) -> bool {
-    code == 0 || board.has_slot(port)
+/// Returns whether a port's MODULE may have this value. A port without points has no module.
+pub(super) fn takes_module(board: &Board, port: u16, code: u16) -> bool {
+    if HAS_SLOTS {
+        code == 0 || board.has_slot(port)
+    } else {
+        board.takes(port, code)
+    }
+}
+
+/// Returns the kinds of the points of a port with this module.
+pub fn kinds(board: &Board, port: u16, module: Module) -> [Kind; CHANNELS] {
+    if HAS_SLOTS {
+        module.points()
+    } else {
+        board.kinds(port, module)
+    }
 }
 
 /// Returns the port, 1 to 8, whose MODULE is at this address.
@@ -236,6 +288,13 @@ pub(super) fn port_of(address: u16) -> Option<u16> {
 /// Returns whether the registers of a rule hold a setting.
 const fn holds(rule: &Rule) -> bool {
     rule.first != KEY && rule.first != COMMAND
+}
+
+/// Iterates over the addresses of the settings that need a restart.
+pub(super) fn restart_addresses() -> impl Iterator<Item = u16> {
+    Addresses::from(KEY)
+        .filter(|(rule, _)| rule.in_force == InForce::Restart)
+        .map(|(_, address)| address)
 }
 
 /// Iterates over every address that holds a setting, with its rule, in ascending order.

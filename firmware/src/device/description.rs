@@ -17,6 +17,7 @@ use core::{array, slice};
 use modbus_server::{Exception, Span, WordsOut, crc};
 use register_map::Board;
 
+use crate::HAS_SLOTS;
 use crate::config::Config;
 
 include!(concat!(env!("OUT_DIR"), "/self_description.rs"));
@@ -124,13 +125,15 @@ fn copy(bytes: &[u8], at: usize, out: &mut slice::IterMut<'_, u8>) {
     }
 }
 
-/// Returns the end of the document: number and module of each port with a slot.
+/// Returns the end of the document: number of each port, how many channels it lacks, and module.
 #[inline(never)]
 fn ports<const SLOTS: usize>(config: &Config<SLOTS>) -> [[u8; PORT_BYTES]; SLOTS] {
     let (first, modules) = (config.board().first_port, config.modules());
     array::from_fn(|index| {
         let module = modules.get(index).map_or(0, |module| module.code());
-        let [high, low] = module.to_be_bytes();
-        [first.wrapping_add(index as u16) as u8, high, low]
+        let port = first.wrapping_add(index as u16);
+        let fixed = config.board().fixed(port).filter(|_| !HAS_SLOTS);
+        let lacks = fixed.map_or(0, |port| 4 - port.channels);
+        [port as u8, lacks, module as u8]
     })
 }

@@ -4,9 +4,10 @@ use core::ops::Range;
 
 use modbus_server::{Bits, BitsOut, Exception, Span, Words, WordsOut};
 use modio_drivers::{CHANNELS, ChannelStatus, Kind};
-use register_map::{Module, counters, edges, limits, points};
+use register_map::{counters, edges, limits, points};
 
 use super::port::IoPort;
+use crate::config::{Config, kinds};
 
 /// The points of the board's slots. Their port numbers are consecutive.
 #[derive(Debug)]
@@ -17,12 +18,16 @@ pub struct Points<const SLOTS: usize> {
 }
 
 impl<const SLOTS: usize> Points<SLOTS> {
-    /// Creates points of these kinds by port, from an address on, with every value 0.
+    /// Creates the points of the modules in force, with every value 0.
     #[must_use]
-    pub fn new(first: u16, modules: &[Module; SLOTS]) -> Self {
+    pub fn new(config: &Config<SLOTS>) -> Self {
+        let mut ports = config.board().ports();
         Self {
-            first,
-            ports: modules.map(|module| IoPort::new(module.points())),
+            first: config.board().points().start,
+            ports: config.modules().map(|module| {
+                let port = ports.next().unwrap_or_default();
+                IoPort::new(kinds(config.board(), port, module))
+            }),
         }
     }
 

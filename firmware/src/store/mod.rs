@@ -87,7 +87,11 @@ impl Store {
 
     /// Returns the stored configuration, as far as this board allows it. [`Self::prepare`] uses the same record.
     #[must_use]
-    pub fn load<const SLOTS: usize>(&mut self, board: &Board, flash: &impl Pages) -> Loaded<SLOTS> {
+    pub fn load<const SLOTS: usize>(
+        &mut self,
+        board: &'static Board,
+        flash: &impl Pages,
+    ) -> Loaded<SLOTS> {
         while let Some(Newest { page, place }) = self.newest() {
             if let Some(record) = record_at(flash.page(page), place.offset) {
                 let (settings, rejected) = Settings::load(board, record.pairs());

@@ -160,9 +160,10 @@ fn ports(d: &mut Decoder<'_>) -> Read<Vec<Port>> {
     if !rest.is_empty() {
         return Err(form("a port without a whole module code"));
     }
-    let ports = ports.iter().map(|&[number, high, low]| Port {
+    let ports = ports.iter().map(|&[number, lacks, module]| Port {
         number,
-        module: u16::from_be_bytes([high, low]),
+        module: module.into(),
+        lacks,
     });
     Ok(ports.collect())
 }

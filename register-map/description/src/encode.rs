@@ -35,10 +35,10 @@ fn document(e: &mut Out<'_>, of: &Description) -> Done {
     of.modules.iter().try_for_each(|one| module_type(e, one))?;
     e.array(of.registers.len() as u64)?;
     of.registers.iter().try_for_each(|one| register(e, one))?;
-    let ports = of.ports.iter().flat_map(|port| {
-        let [high, low] = port.module.to_be_bytes();
-        [port.number, high, low]
-    });
+    let ports = of
+        .ports
+        .iter()
+        .flat_map(|port| [port.number, port.lacks, port.module as u8]);
     let ports: Vec<u8> = ports.collect();
     debug_assert!(ports.len().is_multiple_of(PORT_BYTES));
     e.bytes(&ports)?;

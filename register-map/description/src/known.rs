@@ -2,7 +2,7 @@
 
 use register_map::points::{self, Kind};
 use register_map::state::MAP_VERSION_VALUE;
-use register_map::{Access, Board, InForce, Module, Rule, Text};
+use register_map::{Access, Board, InForce, Module, Rule, Text, configuration, state};
 
 use crate::{
     Description, Field, ModuleType, Narrower, PointKind, Port, Reading, Register, Scope, Table,
@@ -21,16 +21,15 @@ const KINDS: [Kind; 5] = [
 /// Describes a unit of this board with firmware of this version. `module` returns the module in force at a port, 1
 /// to 8.
 pub fn describe(board: &Board, firmware: &str, module: impl Fn(u16) -> Module) -> Description {
-    let blocks = board
-        .blocks()
-        .filter(|block| block.first != points::BLOCK.first);
-    let registers = blocks.flat_map(|block| block.registers());
     Description {
         board: board.name.to_owned(),
         model: board.model.to_owned(),
         firmware: firmware.to_owned(),
         map_version: MAP_VERSION_VALUE,
-        registers: registers.map(|(rule, text)| register(rule, text)).collect(),
+        registers: board
+            .registers()
+            .map(|(rule, text)| register(board, rule, text))
+            .collect(),
         kinds: KINDS.map(kind).into(),
         modules: Module::ALL.map(module_type).into(),
         ports: board
@@ -38,12 +37,13 @@ pub fn describe(board: &Board, firmware: &str, module: impl Fn(u16) -> Module) -
             .map(|number| Port {
                 number: number as u8,
                 module: module(number).code(),
+                lacks: board.fixed(number).map_or(0, |port| 4 - port.channels),
             })
             .collect(),
     }
 }
 
-fn register(rule: &Rule, text: &Text) -> Register {
+fn register(board: &Board, rule: &Rule, text: &Text) -> Register {
     Register {
         address: rule.first,
         count: rule.count,
@@ -53,8 +53,16 @@ fn register(rule: &Rule, text: &Text) -> Register {
             register_map::Scope::Port => Scope::Port,
             register_map::Scope::Point => Scope::Point,
         },
-        value: value(text.value),
-        writable: rule.access != Access::ReadOnly,
+        value: match rule.first {
+            // Names of other boards would only take room in flash.
+            state::BOARD => Value::Codes(vec![(board.code, board.name.to_owned())]),
+            _ => value(text.value),
+        },
+        writable: match rule.first {
+            configuration::MODULE => board.ports().any(|port| board.chooses(port)),
+            configuration::RANGE => board.fixed.is_empty(),
+            _ => rule.access != Access::ReadOnly,
+        },
         restart: rule.in_force == InForce::Restart,
         values: values(rule.values),
         default: rule.default,
@@ -177,7 +185,8 @@ mod tests {
             unit.ports,
             [Port {
                 number: 5,
-                module: 4
+                module: 4,
+                lacks: 0,
             }]
         );
     }

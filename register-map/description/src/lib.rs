@@ -213,11 +213,13 @@ pub struct ModuleType {
     pub points: [u8; 4],
 }
 
-/// A port with a slot.
+/// A port with points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Port {
     /// Number of the port, 1 to 8.
     pub number: u8,
     /// Code of the module in force.
     pub module: u16,
+    /// Number of the module's channels that the port does not have: the last ones.
+    pub lacks: u8,
 }

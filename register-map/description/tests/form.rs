@@ -36,7 +36,8 @@ fn the_ports_are_the_last_bytes() {
         ports: (1..=4)
             .map(|number| Port {
                 number,
-                module: 0x0102 * u16::from(number),
+                module: u16::from(number),
+                lacks: number - 1,
             })
             .collect(),
         ..mixed
@@ -45,7 +46,7 @@ fn the_ports_are_the_last_bytes() {
     assert_eq!(none.len(), mixed.len());
     let (same, last) = mixed.split_at(mixed.len() - 4 * PORT_BYTES);
     assert!(none.starts_with(same));
-    assert_eq!(last, [1, 1, 2, 2, 2, 4, 3, 3, 6, 4, 4, 8]);
+    assert_eq!(last, [1, 0, 1, 2, 1, 2, 3, 2, 3, 4, 3, 4]);
 }
 
 #[test]
@@ -180,7 +181,8 @@ fn fields_and_kinds_of_a_later_version_are_skipped() {
     assert_eq!(register(&unit, "PLAIN").value, plain);
     let port = Port {
         number: 2,
-        module: 0x012C,
+        module: 0x2C,
+        lacks: 1,
     };
     assert_eq!(unit.ports, [port]);
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use anyhow::{Context as _, Result, bail, ensure};
 use register_map::points::{self, Kind, output_values};
-use register_map::{BLOCKS, Board, Module, Values, codes, configuration, links, state};
+use register_map::{BLOCKS, Board, Module, Rule, Values, codes, configuration, links, state};
 
 use crate::bench::Bench;
 use crate::case::Check;
@@ -180,7 +180,8 @@ fn modio(bench: &mut Bench<'_>) -> Check<Target> {
             continue;
         }
         let mut open: Option<Span> = None;
-        for (rule, _) in block.registers() {
+        let there = |(rule, _): &(&Rule, _)| board.is_none_or(|board| board.has(rule.first));
+        for (rule, _) in block.registers().filter(there) {
             let here = Span::of(rule.first, rule.count);
             match &mut open {
                 Some(span) if span.last + 1 == here.first => span.last = here.last,

@@ -136,7 +136,12 @@ impl Modio {
 
     /// Returns the points of all modules with their kinds, in ascending order of their addresses.
     pub fn points(&self) -> impl Iterator<Item = (u16, Kind)> {
-        let of_slot = |(port, module): (u16, Module)| (points::first(port)..).zip(module.points());
+        let of_slot = |(port, module): (u16, Module)| {
+            let kinds = self
+                .board
+                .map_or(module.points(), |board| board.kinds(port, module));
+            (points::first(port)..).zip(kinds)
+        };
         let points = self.slots().flat_map(of_slot);
         points.filter(|(_, kind)| *kind != Kind::None)
     }

@@ -1,15 +1,20 @@
 //! What one part of the family has and another has not: memories, pins, identity.
 //!
-//! The register blocks are those that all parts of the family have (RM0008 1.3 and table 3). A block that only a
-//! larger part has is reported by its name when it is accessed.
+//! A part has a register block if RCC has a bit for its clock (RM0008 1.3 and table 3). A block of a larger part that
+//! is not modelled is reported by its name when it is accessed.
 
-/// The package's pins of ports A to D, one bit each.
-type Ports = [u16; 4];
+use crate::soc::PORTS;
+use crate::soc::map::Block;
+
+/// The package's pins of ports A to E, one bit each.
+type Ports = [u16; PORTS];
 
 /// LQFP48 (DS5319 table 5).
-const LQFP48: Ports = [0xFFFF, 0xFFFF, 0xE000, 0x0003];
+const LQFP48: Ports = [0xFFFF, 0xFFFF, 0xE000, 0x0003, 0];
 /// LQFP64 (DS5792 table 5).
-const LQFP64: Ports = [0xFFFF, 0xFFFF, 0xFFFF, 0x0007];
+const LQFP64: Ports = [0xFFFF, 0xFFFF, 0xFFFF, 0x0007, 0];
+/// LQFP100 (DS5792 table 5).
+const LQFP100: Ports = [0xFFFF; PORTS];
 
 /// A part of the STM32F103 family.
 #[derive(Clone, Copy, Debug)]
@@ -79,19 +84,33 @@ pub const STM32F103RC: Part = Part {
         (0x4000_1000, "TIM6"),
         (0x4000_1400, "TIM7"),
         (0x4000_3C00, "SPI3"),
-        (0x4000_4C00, "UART4"),
         (0x4000_5000, "UART5"),
-        (0x4000_7400, "DAC"),
         (0x4001_1C00, "GPIOF"),
         (0x4001_2000, "GPIOG"),
         (0x4001_3400, "TIM8"),
         (0x4001_3C00, "ADC3"),
         (0x4001_8000, "SDIO"),
-        (0x4002_0400, "DMA2"),
     ],
 };
 
+/// As STM32F103RC in the package with 100 pins.
+pub const STM32F103VC: Part = Part {
+    name: "STM32F103VC",
+    ports: LQFP100,
+    ..STM32F103RC
+};
+
 impl Part {
+    /// Returns whether the part has `block`.
+    #[must_use]
+    pub fn has(&self, block: Block) -> bool {
+        // The order of `Block::clock`: APB2, APB1, AHB.
+        let [ahb, apb2, apb1] = self.clock_enables;
+        block
+            .clock()
+            .is_none_or(|(bus, bit)| [apb2, apb1, ahb][bus] >> bit & 1 != 0)
+    }
+
     /// Returns the unmodelled block at `address` that only larger parts have, if this part has it.
     #[must_use]
     pub fn unmodelled(&self, address: u32) -> Option<&'static str> {

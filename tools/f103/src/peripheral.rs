@@ -41,6 +41,11 @@ pub trait Peripheral {
         false
     }
 
+    /// Returns whether the block requests a DMA transfer: a read of it, and a write to it.
+    fn dma_requests(&self) -> [bool; 2] {
+        [false; 2]
+    }
+
     /// Resets the block: a system reset, or its bit in RCC_APB1RSTR or RCC_APB2RSTR.
     fn reset(&mut self, now: Time);
 

@@ -4,6 +4,9 @@ use modio_description::{
     Description, ModuleType, PointKind, Reading, Register, Scope, Table, Unit, Value, Values,
 };
 
+use register_map::configuration::MODULE;
+use register_map::{Board, points};
+
 use crate::failure::Failure;
 
 /// Number of points of a port.
@@ -268,7 +271,8 @@ fn unknown(address: u16) -> Item {
 fn kinds(description: &Description) -> impl Iterator<Item = (u16, u16, &PointKind)> {
     description.ports.iter().flat_map(move |port| {
         let points = module(description, port.module).map_or([0; 4], |module| module.points);
-        (1..).zip(points).filter_map(move |(channel, kind)| {
+        let channels = 1..=CHANNELS.saturating_sub(port.lacks.into());
+        channels.zip(points).filter_map(move |(channel, kind)| {
             let kind = description.kinds.get(usize::from(kind))?;
             Some((u16::from(port.number), channel, kind))
         })
@@ -333,8 +337,15 @@ fn registers(description: &Description, register: &Register) -> Vec<Item> {
             .collect(),
         Scope::Port => {
             let ports = description.ports.iter().map(|port| u16::from(port.number));
+            let board = Board::named(&description.board);
             ports
-                .map(|port| item(format!("p{port}.{name}"), port.max(1) - 1))
+                .map(|port| {
+                    let mut item = item(format!("p{port}.{name}"), port.max(1) - 1);
+                    if is_module(&item) && board.is_some_and(|board| !board.chooses(port)) {
+                        (item.writable, item.setting, item.values) = (false, false, None);
+                    }
+                    item
+                })
                 .collect()
         }
         Scope::Point => points_of(description, register)
@@ -377,6 +388,11 @@ fn points_of<'a>(
     })
 }
 
+/// Returns whether an item is MODULE of a port.
+pub fn is_module(item: &Item) -> bool {
+    (MODULE..MODULE + points::PORTS).contains(&item.address)
+}
+
 /// Returns whether a writable register is a setting, and not the lock, a command or a counter.
 fn is_setting(register: &Register) -> bool {
     !matches!(register.name.as_str(), "KEY" | "COMMAND")
@@ -398,7 +414,7 @@ pub fn book(
 mod tests {
     use modio_description::describe;
     use register_map::Module;
-    use register_map::board::{MODIO_02, MODIO_08};
+    use register_map::board::{FX3U_24, MODIO_02, MODIO_08};
 
     use super::*;
 
@@ -448,6 +464,27 @@ mod tests {
         assert_eq!(links.len(), 4 * 4);
         let last = book.find("4.4.LINK2").unwrap();
         assert_eq!((last.address, last.words, last.setting), (0x04BC, 4, true));
+    }
+
+    #[test]
+    fn items_are_those_of_a_board_without_slots() {
+        let module = |port| FX3U_24.fixed(port).map_or(Module::None, |port| port.module);
+        let book = Book::new(describe(&FX3U_24, "0.1.0", module), vec![(0, 0); 32]);
+        for (name, setting) in [
+            ("UNIT", Some(true)),
+            ("p7.2", Some(false)),
+            ("p7.3", None),
+            ("p7.2.safe", Some(true)),
+            ("p7.3.safe", None),
+            ("p7.module", Some(false)),
+            ("p8.module", Some(true)),
+            ("p8.1.range", Some(false)),
+            ("LORA", None),
+            ("p7.2.link1", Some(true)),
+        ] {
+            let item = book.find(name).ok();
+            assert_eq!(item.map(|item| item.setting), setting, "{name}");
+        }
     }
 
     #[test]

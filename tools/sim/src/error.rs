@@ -13,6 +13,12 @@ pub enum Error {
     /// The board has no slot at this port.
     #[error("the board has no slot at port {0}")]
     Slot(u8),
+    /// The board has no terminal with this name.
+    #[error("the board has no terminal with this name")]
+    Terminal,
+    /// The terminal is of another kind, or an output.
+    #[error("the terminal is of another kind")]
+    TerminalKind,
     /// The board has no LoRa module.
     #[error("the board has no LoRa module")]
     NoRadio,

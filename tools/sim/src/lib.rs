@@ -5,7 +5,7 @@
 //! it, the same calls give the same run to the instruction, and nothing here reads the wall clock.
 //!
 //! ```text
-//! board      the modio-02 and the modio-08       line   the RS-485 bus and its frames
+//! board      the modio and bought boards         line   the RS-485 bus and its frames
 //! bus        several boards on one line          slot   what is plugged in, and the world outside it
 //! exact_line the protocol by which a client      radio  the LoRa module, and the air with its gateway
 //!            lets time pass                        options the options of the command `modio-sim`
@@ -19,6 +19,7 @@ pub mod line;
 pub mod options;
 pub mod radio;
 pub mod slot;
+mod uart;
 
 pub use board::{Board, Config, Leds};
 pub use bus::Bus;

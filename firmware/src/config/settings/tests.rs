@@ -32,7 +32,7 @@ fn defaults_are_the_factory_settings_and_count_as_unchanged() {
     assert_eq!((settings.get(0x0145), settings.get(0x017F)), (300, 3950));
     assert_eq!((settings.get(0x0201), settings.get(0x0001)), (0, 0));
     assert_eq!(changed(&settings), []);
-    assert_eq!(RESTARTS, 6 + 8 + 6 + 32);
+    assert_eq!(RESTARTS, 7 + 8 + 6 + 32);
     assert_eq!(settings.restart_values().count(), RESTARTS);
 }
 

@@ -2,6 +2,7 @@
 
 extern crate std;
 
+mod fixed;
 mod module;
 mod origin;
 mod ranges;
@@ -44,7 +45,11 @@ fn write<const SLOTS: usize>(
     Ok(command)
 }
 
-fn read(config: &Config, start: u16, count: u16) -> Result<Vec<u16>, Exception> {
+fn read<const SLOTS: usize>(
+    config: &super::Config<SLOTS>,
+    start: u16,
+    count: u16,
+) -> Result<Vec<u16>, Exception> {
     let span = Span::new(start, count).unwrap();
     config.check_read(span)?;
     let mut bytes = std::vec![0xEE; usize::from(count) * 2];

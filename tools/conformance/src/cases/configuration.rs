@@ -55,12 +55,15 @@ fn value_first(bench: &mut Bench<'_>) -> Check {
         (configuration::RESPONSE_DELAY, 1001),
         (configuration::FRAME_GAP, 1),
         (configuration::COMM_TIMEOUT, 36_001),
-        (configuration::MODULE, Module::LAST + 1),
         (configuration::BETA, 1999),
     ];
     if let Some(board) = bench.target.modio.and_then(|modio| modio.board) {
-        let ports = (1..=points::PORTS).filter(|port| !board.has_slot(*port));
-        wrong.extend(ports.map(|port| (configuration::module_of(port), 1)));
+        let ports = (1..=points::PORTS).filter(|port| board.chooses(*port));
+        wrong.extend(ports.map(|port| {
+            let known = board.has_slot(port);
+            let code = if known { Module::LAST + 1 } else { 1 };
+            (configuration::module_of(port), code)
+        }));
     }
     for (register, value) in wrong {
         let before = bench.read_word(register)?;

@@ -4,14 +4,18 @@
 use super::Chip;
 use crate::machine::Limit;
 use crate::periph::usart::Usart;
-use crate::soc::Circuit;
+use crate::soc::{Circuit, Pin};
 use crate::time::Time;
 
 impl<C: Circuit> Chip<C> {
-    /// Returns USART1 as of the last instruction: what it sends next, and when.
+    /// Returns the USART whose transmitter is at pin `tx` as of the last instruction: what it sends next, and when.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such USART.
     #[must_use]
-    pub const fn usart1(&self) -> &Usart {
-        self.bus.soc.usart1()
+    pub fn usart(&self, tx: Pin) -> &Usart {
+        self.bus.soc.usart(tx)
     }
 
     /// Returns the circuit, for changes that the part sees only at an RX pin, or not at all. Call
@@ -36,6 +40,7 @@ impl<C: Circuit> Chip<C> {
     pub fn sync(&mut self) {
         let now = self.now();
         self.bus.soc.sync(now);
+        self.bus.take_notes();
     }
 
     /// Runs as [`Chip::run_until`], but neither takes over changes of the circuit before nor computes what is computed

@@ -84,7 +84,7 @@ impl<C: Circuit> Chip<C> {
         self.bus.soc.disturb_i2c(now)
     }
 
-    /// Returns the level of a pin, as a logic probe shows it: port `'A'` to `'D'`, pin 0 to 15. Low for a pin that does
+    /// Returns the level of a pin, as a logic probe shows it: port `'A'` to `'E'`, pin 0 to 15. Low for a pin that does
     /// not exist.
     #[must_use]
     pub fn pin(&self, port: char, pin: u8) -> bool {

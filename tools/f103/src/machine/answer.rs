@@ -73,12 +73,12 @@ impl<C: Circuit> Bus<C> {
         let Request { address, write, .. } = request;
         let (place, offset) = map::place(address);
         let block = match place {
-            Place::Block(block) => block,
+            Place::Block(block) if self.part.has(block) => block,
             Place::Absent(name) => {
                 self.note_unmodelled(request, name);
                 return 0;
             }
-            Place::Reserved => {
+            Place::Block(_) | Place::Reserved => {
                 let name = self.part.unmodelled(address);
                 self.note_unmodelled(request, name.unwrap_or("a reserved address"));
                 return 0;
@@ -196,9 +196,9 @@ impl<C: Circuit> Bus<C> {
                 Width::Word => 4,
             };
             let at = offset as usize;
-            self.ram.bytes_mut()[at..at + width].copy_from_slice(&bytes[..width]);
+            self.soc.ram.bytes_mut()[at..at + width].copy_from_slice(&bytes[..width]);
         }
-        word_of(self.ram.bytes(), request, offset)
+        word_of(self.soc.ram.bytes(), request, offset)
     }
 
     /// Answers a read of flash that is sent to the bus: of pages with unsteady cells, and of the page of the vector

@@ -18,7 +18,7 @@ use super::segment::Segments;
 use super::timing::InstructionClock;
 use super::waits::Waits;
 use crate::finding::{Findings, What, Width};
-use crate::memory::{FLASH_BASE, Memory};
+use crate::memory::FLASH_BASE;
 use crate::part::Part;
 use crate::periph::dbgmcu::Dbgmcu;
 use crate::periph::ident::Ident;
@@ -51,8 +51,6 @@ pub struct Bus<C> {
     pub(super) pc: u32,
     /// The measurement of interrupt waits, while it is on.
     pub(super) waits: Option<Box<Waits>>,
-    /// The SRAM.
-    pub(super) ram: Memory,
     /// The costs of the code.
     pub(super) segments: Segments,
     /// Reads of flash come here: all of them, or those of these pages of the core's.
@@ -89,9 +87,7 @@ impl<C: Circuit> Bus<C> {
             }
         }
         if self.soc.has_notes() {
-            for (at, what) in self.soc.take_notes() {
-                self.findings.add(at, self.pc, what);
-            }
+            self.take_notes();
         }
         if core::mem::take(&mut self.soc.signals.rate) {
             self.update_rate(count);
@@ -106,6 +102,13 @@ impl<C: Circuit> Bus<C> {
         // The machine makes the reset, and waits out the flash.
         let busy = self.soc.flash.busy_until().is_some();
         self.halt |= self.soc.signals.reset.is_some() || busy != self.busy;
+    }
+
+    /// Takes up the findings of the blocks and of the circuit.
+    pub fn take_notes(&mut self) {
+        for (at, what) in self.soc.take_notes() {
+            self.findings.add(at, self.pc, what);
+        }
     }
 
     /// The instruction rate follows HCLK and the flash's wait states.

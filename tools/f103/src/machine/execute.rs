@@ -47,7 +47,8 @@ impl<C: Circuit> Chip<C> {
             if !self.bus.clock.goes_on(count, pc) {
                 if pc >= RAM_BASE {
                     let offset = (pc - RAM_BASE) as usize;
-                    self.ram_code.runs(offset, &mut *self.core, &self.bus.ram);
+                    self.ram_code
+                        .runs(offset, &mut *self.core, &self.bus.soc.ram);
                 }
                 self.follow(count, pc);
             }
@@ -108,7 +109,7 @@ impl<C: Circuit> Chip<C> {
         let flash = bus.flash_offset(pc);
         let (memory, offset, changes) = match flash {
             Some(offset) => (bus.soc.flash.bytes(), offset, Some(bus.soc.flash.changes())),
-            None => (bus.ram.bytes(), pc.wrapping_sub(RAM_BASE), None),
+            None => (bus.soc.ram.bytes(), pc.wrapping_sub(RAM_BASE), None),
         };
         let code = memory.get(offset as usize..).unwrap_or_default();
         let place = Place {
@@ -192,7 +193,7 @@ impl<C: Circuit> Chip<C> {
             Some(u32::from_le_bytes(bytes.try_into().ok()?))
         };
         let flash = self.bus.soc.flash.bytes();
-        let handler = word(self.bus.ram.bytes(), RAM_BASE)
+        let handler = word(self.bus.soc.ram.bytes(), RAM_BASE)
             .or_else(|| word(flash, FLASH_BASE))
             .or_else(|| word(flash, 0))
             .unwrap_or_default();

@@ -184,7 +184,7 @@ impl<C> Drop for Chip<C> {
             core,
             fresh: core::mem::take(&mut self.fresh),
             flash: self.bus.soc.flash.take_memory(),
-            ram: core::mem::replace(&mut self.bus.ram, Memory::new(1, 0)),
+            ram: core::mem::replace(&mut self.bus.soc.ram, Memory::new(1, 0)),
             ram_code: core::mem::take(&mut self.ram_code),
         });
     }

@@ -30,7 +30,7 @@ impl<C: Circuit> Chip<C> {
     /// Starts to measure how long interrupts wait, from zero. `false` ends the measurement and drops its results. With
     /// it a busy unit runs several times slower.
     pub fn measure_waits(&mut self, on: bool) {
-        self.ram_code.end(&mut *self.core, &self.bus.ram);
+        self.ram_code.end(&mut *self.core, &self.bus.soc.ram);
         if let Some(mut waits) = self.bus.waits.take() {
             waits.leave(&mut *self.core);
         }

@@ -123,14 +123,14 @@ impl<C: Circuit> Chip<C> {
         }
         image.load(flash.bytes_mut(), part.page_size)?;
         let ident = Ident::new(part, config.unique_id, config.write_protection);
-        let mut soc = Soc::new(&config, flash, circuit);
         let Parts {
             core,
             fresh,
             ram,
             ram_code,
             used,
-        } = Parts::of(part, &mut soc.flash, config.new_core);
+        } = Parts::of(part, &mut flash, config.new_core);
+        let soc = Soc::new(&config, flash, ram, circuit);
         let hclk = soc.rcc.clocks().hclk;
         let mut chip = Self {
             core,
@@ -153,7 +153,6 @@ impl<C: Circuit> Chip<C> {
                 queued: Vec::new(),
                 pc: 0,
                 waits: None,
-                ram,
                 flash_is_watched: false,
                 routed_pages: vec![false; part.flash_size / ROUTED_PAGE],
                 read_stalls: false,
@@ -218,13 +217,13 @@ impl<C: Circuit> Chip<C> {
 
     /// Returns the text that the firmware has logged over RTT since the last call.
     pub fn take_log(&mut self) -> String {
-        self.log.take(self.bus.ram.bytes())
+        self.log.take(self.bus.soc.ram.bytes())
     }
 
     /// Returns the contents of the SRAM.
     #[must_use]
     pub fn ram(&self) -> &[u8] {
-        self.bus.ram.bytes()
+        self.bus.soc.ram.bytes()
     }
 
     /// Returns the contents of the SRAM, for changing them as with a debug probe.
@@ -232,9 +231,9 @@ impl<C: Circuit> Chip<C> {
         let base = u64::from(RAM_BASE);
         self.core.ask(Queued::Invalidate(
             base,
-            base + self.bus.ram.bytes().len() as u64,
+            base + self.bus.soc.ram.bytes().len() as u64,
         ));
-        self.bus.ram.bytes_mut()
+        self.bus.soc.ram.bytes_mut()
     }
 
     /// Returns a part of the flash, to change; only the code in it is translated anew. `None` when it does not all lie

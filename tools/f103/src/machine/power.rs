@@ -25,7 +25,7 @@ impl<C: Circuit> Chip<C> {
         self.powered = true;
         self.power_ons += 1;
         self.keep_ram_code();
-        fill_with_noise(self.bus.ram.bytes_mut(), self.power_ons);
+        fill_with_noise(self.bus.soc.ram.bytes_mut(), self.power_ons);
         self.bus.dbgmcu = Dbgmcu::new(self.bus.part.idcode);
         self.bus.dwt = Dwt::default();
         self.bus.soc.set_power(true, self.now());
@@ -41,7 +41,7 @@ impl<C: Circuit> Chip<C> {
         }
         let now = self.now();
         self.bus.advance(now, self.core.retired());
-        self.log.poll(self.bus.ram.bytes_mut());
+        self.log.poll(self.bus.soc.ram.bytes_mut());
         self.powered = false;
         self.locked_up = false;
         self.cut = None;
@@ -81,7 +81,7 @@ impl<C: Circuit> Chip<C> {
     /// Resets the whole part.
     pub(super) fn reset_by(&mut self, cause: Cause) {
         let now = self.now();
-        self.log.reset(self.bus.ram.bytes_mut());
+        self.log.reset(self.bus.soc.ram.bytes_mut());
         self.bus.soc.reset(cause, now);
         let count = self.core.retired();
         self.counted += count;
@@ -128,7 +128,7 @@ impl<C: Circuit> Chip<C> {
     /// Keeps what was translated from SRAM, for a start that copies the same code there.
     fn keep_ram_code(&mut self) {
         if self.bus.waits.is_none() {
-            self.ram_code.reset(&mut *self.core, &self.bus.ram);
+            self.ram_code.reset(&mut *self.core, &self.bus.soc.ram);
         } else {
             // The measurement decides which pages are sent to the bus.
             self.ram_mut();

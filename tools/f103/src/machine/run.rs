@@ -99,7 +99,7 @@ impl<C: Circuit> Chip<C> {
             }
             self.serve_nmi();
             if now >= self.poll_at {
-                self.log.poll(self.bus.ram.bytes_mut());
+                self.log.poll(self.bus.soc.ram.bytes_mut());
                 self.poll_at = POLL * (now.as_ps() / POLL.as_ps() + 1);
             }
             if now >= limit.time {

@@ -1,12 +1,15 @@
 //! Alternate-function I/O, RM0008 section 9.4: the port that feeds each EXTI line, and the debug port's pins.
 //!
-//! Pin remapping is not modelled: every peripheral is on its default pins.
+//! Pin remapping is not modelled, except that of CAN, whose traffic is not modelled: every other peripheral is on its
+//! default pins.
 
 use crate::peripheral::{Peripheral, Unmodelled};
 use crate::time::Time;
 
 /// SWJ_CFG, write-only (RM0008 9.4.2).
 const MAPR_SWJ_CFG: u32 = 0b111 << 24;
+/// CAN_REMAP (RM0008 9.4.2).
+const MAPR_CAN_REMAP: u32 = 0b11 << 13;
 
 /// The bits that each EXTICR keeps, read back from two boards after all ones were written (labwired-core,
 /// stm32f1_mmio_diff.rs).
@@ -16,9 +19,27 @@ const EXTICR: u32 = 0x7FFF;
 #[derive(Debug, Default)]
 pub struct Afio {
     exticr: [u32; 4],
+    mapr: u32,
+    /// SWJ_CFG.
+    debug: u32,
 }
 
 impl Afio {
+    /// Returns the pins of ports A and B that the debug port owns, one bit each (RM0008 table 35).
+    #[must_use]
+    pub const fn debug_pins(&self) -> [u16; 2] {
+        const JTDI: u16 = 1 << 15;
+        const SW_DP: u16 = 0b11 << 13;
+        const JTDO: u16 = 1 << 3;
+        const NJTRST: u16 = 1 << 4;
+        match self.debug {
+            1 => [JTDI | SW_DP, JTDO],
+            2 => [SW_DP, 0],
+            4 => [0, 0],
+            _ => [JTDI | SW_DP, JTDO | NJTRST],
+        }
+    }
+
     /// Returns the port that feeds EXTI line `line` (0 to 15): 0 = A, 1 = B, ...
     #[must_use]
     pub fn exti_port(&self, line: usize) -> usize {
@@ -30,7 +51,9 @@ impl Peripheral for Afio {
     fn read(&mut self, offset: u32, _now: Time) -> Result<u32, Unmodelled> {
         match offset {
             0x00 => Err(Unmodelled("AFIO_EVCR, the event output")),
-            0x04 => Ok(0),
+            // SWJ_CFG is write-only. A real part returns any value there; zeros show firmware that writes back what
+            // it has read.
+            0x04 => Ok(self.mapr),
             0x08..=0x14 => Ok(self.exticr[(offset as usize - 8) / 4]),
             _ => Err(Unmodelled("a reserved address of AFIO")),
         }
@@ -38,8 +61,14 @@ impl Peripheral for Afio {
 
     fn write(&mut self, offset: u32, value: u32, _now: Time) -> Result<(), Unmodelled> {
         match offset {
-            0x04 if value & !MAPR_SWJ_CFG == 0 => Ok(()),
-            0x04 => Err(Unmodelled("pin remapping (AFIO_MAPR)")),
+            0x04 => {
+                self.mapr = value & MAPR_CAN_REMAP;
+                self.debug = (value & MAPR_SWJ_CFG) >> 24;
+                if value & !(MAPR_SWJ_CFG | MAPR_CAN_REMAP) != 0 {
+                    return Err(Unmodelled("pin remapping (AFIO_MAPR)"));
+                }
+                Ok(())
+            }
             0x08..=0x14 => {
                 self.exticr[(offset as usize - 8) / 4] = value & EXTICR;
                 Ok(())
@@ -63,7 +92,20 @@ mod tests {
         let mut afio = Afio::default();
         afio.write(0x0C, 0x0021, Time::ZERO).unwrap();
         assert_eq!((afio.exti_port(4), afio.exti_port(5)), (1, 2));
-        assert_eq!(afio.write(4, 2 << 24, Time::ZERO), Ok(()));
         assert!(afio.write(4, 1 << 2, Time::ZERO).is_err(), "USART1 remap");
+    }
+
+    #[test]
+    fn every_write_of_mapr_sets_the_pins_of_the_debug_port() {
+        let mut afio = Afio::default();
+        assert_eq!(afio.debug_pins(), [0xE000, 0x18]);
+        for (configuration, pins) in [(1, [0xE000, 8]), (2, [0x6000, 0]), (4, [0, 0])] {
+            afio.write(4, configuration << 24, Time::ZERO).unwrap();
+            assert_eq!(afio.debug_pins(), pins);
+            assert_eq!(afio.read(4, Time::ZERO), Ok(0), "write-only");
+        }
+        afio.write(4, MAPR_CAN_REMAP, Time::ZERO).unwrap();
+        assert_eq!(afio.read(4, Time::ZERO), Ok(MAPR_CAN_REMAP));
+        assert_eq!(afio.debug_pins(), [0xE000, 0x18]);
     }
 }

@@ -2,9 +2,12 @@
 
 pub mod adc;
 pub mod afio;
+pub mod can;
 pub mod clocks;
 pub mod crc;
+pub mod dac;
 pub mod dbgmcu;
+pub mod dma;
 pub mod exti;
 pub mod flash;
 pub mod gpio;

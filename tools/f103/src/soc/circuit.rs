@@ -7,8 +7,8 @@ use crate::periph::i2c::Bus;
 use crate::periph::usart::Wire;
 use crate::time::Time;
 
-/// Number of ports that are modelled: A to D.
-pub const PORTS: usize = 4;
+/// Number of ports that are modelled: A to E.
+pub const PORTS: usize = 5;
 
 /// A pin of the part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,7 +18,7 @@ pub struct Pin {
 }
 
 impl Pin {
-    /// Returns the pin `number` (0 to 15) of a port (`'A'` to `'D'`).
+    /// Returns the pin `number` (0 to 15) of a port (`'A'` to `'E'`).
     ///
     /// # Panics
     ///
@@ -27,11 +27,11 @@ impl Pin {
     pub const fn new(port: char, number: usize) -> Self {
         match Self::find(port, number) {
             Some(pin) => pin,
-            None => panic!("no such pin: ports are A to D, pins 0 to 15"),
+            None => panic!("no such pin: ports are A to E, pins 0 to 15"),
         }
     }
 
-    /// Returns the pin `number` (0 to 15) of a port (`'A'` to `'D'`, or in lower case). `None` if there is no such pin.
+    /// Returns the pin `number` (0 to 15) of a port (`'A'` to `'E'`, or in lower case). `None` if there is no such pin.
     #[must_use]
     pub const fn find(port: char, number: usize) -> Option<Self> {
         let port = (port.to_ascii_uppercase() as usize).wrapping_sub('A' as usize);
@@ -42,7 +42,7 @@ impl Pin {
         }
     }
 
-    /// Returns the port of the pin, `'A'` to `'D'`.
+    /// Returns the port of the pin, `'A'` to `'E'`.
     #[must_use]
     pub const fn port(self) -> char {
         (b'A' + self.port as u8) as char

@@ -12,10 +12,18 @@ pub enum Block {
     Tim4,
     /// Independent watchdog.
     Iwdg,
+    /// USART2.
+    Usart2,
     /// USART3.
     Usart3,
+    /// UART4, of high-density parts.
+    Uart4,
     /// I2C1.
     I2c1,
+    /// Controller area network.
+    Can,
+    /// Digital-to-analog converter, of high-density parts.
+    Dac,
     /// Alternate-function I/O.
     Afio,
     /// External interrupts.
@@ -28,6 +36,8 @@ pub enum Block {
     GpioC,
     /// Port D.
     GpioD,
+    /// Port E.
+    GpioE,
     /// Analog-to-digital converter 1.
     Adc1,
     /// Advanced timer 1.
@@ -42,10 +52,14 @@ pub enum Block {
     Pwr,
     /// CRC unit.
     Crc,
+    /// DMA controller 1.
+    Dma1,
+    /// DMA controller 2, of high-density parts.
+    Dma2,
 }
 
 /// Number of blocks that are modelled.
-pub const BLOCKS: usize = 19;
+pub const BLOCKS: usize = 26;
 
 /// The owner of an address in the peripheral region.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,7 +80,7 @@ const GRAIN: u32 = 0x400;
 const GRAINS: usize = 0x2_4000 / GRAIN as usize;
 
 /// Base address and owner of each block of the part.
-const PLACES: [(u32, Place); 34] = {
+const PLACES: [(u32, Place); 37] = {
     use Block as B;
     use Place::{Absent, Reserved};
     [
@@ -77,28 +91,31 @@ const PLACES: [(u32, Place); 34] = {
         (0x4000_2C00, Absent("WWDG")),
         (0x4000_3000, Place::Block(B::Iwdg)),
         (0x4000_3800, Absent("SPI2")),
-        (0x4000_4400, Absent("USART2")),
+        (0x4000_4400, Place::Block(B::Usart2)),
         (0x4000_4800, Place::Block(B::Usart3)),
+        (0x4000_4C00, Place::Block(B::Uart4)),
         (0x4000_5400, Place::Block(B::I2c1)),
         (0x4000_5800, Absent("I2C2")),
         (0x4000_5C00, Absent("USB")),
         (0x4000_6000, Absent("USB/CAN SRAM")),
-        (0x4000_6400, Absent("CAN")),
+        (0x4000_6400, Place::Block(B::Can)),
         (0x4000_6C00, Absent("BKP")),
         (0x4000_7000, Place::Block(B::Pwr)),
+        (0x4000_7400, Place::Block(B::Dac)),
         (0x4001_0000, Place::Block(B::Afio)),
         (0x4001_0400, Place::Block(B::Exti)),
         (0x4001_0800, Place::Block(B::GpioA)),
         (0x4001_0C00, Place::Block(B::GpioB)),
         (0x4001_1000, Place::Block(B::GpioC)),
         (0x4001_1400, Place::Block(B::GpioD)),
-        (0x4001_1800, Absent("GPIOE")),
+        (0x4001_1800, Place::Block(B::GpioE)),
         (0x4001_2400, Place::Block(B::Adc1)),
         (0x4001_2800, Absent("ADC2")),
         (0x4001_2C00, Place::Block(B::Tim1)),
         (0x4001_3000, Absent("SPI1")),
         (0x4001_3800, Place::Block(B::Usart1)),
-        (0x4002_0000, Absent("DMA1")),
+        (0x4002_0000, Place::Block(B::Dma1)),
+        (0x4002_0400, Place::Block(B::Dma2)),
         (0x4002_1000, Place::Block(B::Rcc)),
         (0x4002_2000, Place::Block(B::Flash)),
         (0x4002_3000, Place::Block(B::Crc)),
@@ -154,14 +171,19 @@ const BLOCK_FACTS: [Facts; BLOCKS] = {
         (B::Tim3, "TIM3", Some((1, 1)), HalfWord),
         (B::Tim4, "TIM4", Some((1, 2)), HalfWord),
         (B::Iwdg, "IWDG", None, HalfWord),
+        (B::Usart2, "USART2", Some((1, 17)), HalfWord),
         (B::Usart3, "USART3", Some((1, 18)), HalfWord),
+        (B::Uart4, "UART4", Some((1, 19)), HalfWord),
         (B::I2c1, "I2C1", Some((1, 21)), HalfWord),
+        (B::Can, "CAN", Some((1, 25)), Word),
+        (B::Dac, "DAC", Some((1, 29)), Word),
         (B::Afio, "AFIO", Some((0, 0)), Word),
         (B::Exti, "EXTI", None, Word),
         (B::GpioA, "GPIOA", Some((0, 2)), Word),
         (B::GpioB, "GPIOB", Some((0, 3)), Word),
         (B::GpioC, "GPIOC", Some((0, 4)), Word),
         (B::GpioD, "GPIOD", Some((0, 5)), Word),
+        (B::GpioE, "GPIOE", Some((0, 6)), Word),
         (B::Adc1, "ADC1", Some((0, 9)), Word),
         (B::Tim1, "TIM1", Some((0, 11)), HalfWord),
         (B::Usart1, "USART1", Some((0, 14)), HalfWord),
@@ -169,6 +191,8 @@ const BLOCK_FACTS: [Facts; BLOCKS] = {
         (B::Flash, "FLASH", None, Word),
         (B::Pwr, "PWR", Some((1, 28)), HalfWord),
         (B::Crc, "CRC", Some((2, 6)), Word),
+        (B::Dma1, "DMA1", Some((2, 0)), Word),
+        (B::Dma2, "DMA2", Some((2, 1)), Word),
     ]
 };
 
@@ -236,8 +260,25 @@ pub mod irq {
     pub const I2C1_ER: u16 = 32;
     /// USART1.
     pub const USART1: u16 = 37;
+    /// USART2.
+    pub const USART2: u16 = 38;
     /// USART3.
     pub const USART3: u16 = 39;
+    /// UART4.
+    pub const UART4: u16 = 52;
+
+    /// The lines of DMA1, each with a mask of the channels that share it.
+    pub const DMA1: [(u16, u32); 7] = [
+        (11, 1 << 0),
+        (12, 1 << 1),
+        (13, 1 << 2),
+        (14, 1 << 3),
+        (15, 1 << 4),
+        (16, 1 << 5),
+        (17, 1 << 6),
+    ];
+    /// The lines of DMA2, as for DMA1.
+    pub const DMA2: [(u16, u32); 4] = [(56, 1 << 0), (57, 1 << 1), (58, 1 << 2), (59, 0x18)];
 
     /// The lines of EXTI, each with a mask of the pins that share it.
     pub const EXTI: [(u16, u32); 7] = [
@@ -259,7 +300,7 @@ mod tests {
     fn place_returns_the_block_of_an_address() {
         assert_eq!(place(0x4001_3804), (Place::Block(Block::Usart1), 4));
         assert_eq!(place(0x4000_0C00).0, Place::Reserved);
-        assert_eq!(place(0x4002_0000).0, Place::Absent("DMA1"));
+        assert_eq!(place(0x4001_2800).0, Place::Absent("ADC2"));
         assert_eq!(place(0x4003_0000).0, Place::Reserved);
         assert_eq!(place(0x3FFF_FFFF).0, Place::Reserved);
         for (n, block) in Block::ALL.into_iter().enumerate() {

@@ -5,18 +5,25 @@
 //! of a block. Time moves from event to event: each block knows its next event, and [`Soc::advance`] handles the events
 //! in time order.
 
+mod access;
 mod circuit;
 mod config;
+mod dma;
 pub mod map;
 mod requests;
+mod serial;
 mod wires;
 
 use crate::finding::What;
+use crate::memory::Memory;
 use crate::part::Part;
 use crate::periph::adc::Adc;
 use crate::periph::afio::Afio;
+use crate::periph::can::Can;
 use crate::periph::clocks::Clocks;
 use crate::periph::crc::Crc;
+use crate::periph::dac::Dac;
+use crate::periph::dma::Dma;
 use crate::periph::exti::Exti;
 use crate::periph::flash::Flash;
 use crate::periph::gpio::Gpio;
@@ -26,12 +33,12 @@ use crate::periph::pwr::Pwr;
 use crate::periph::rcc::{Cause, Rcc};
 use crate::periph::timer::{Kind, Timer};
 use crate::periph::usart::Usart;
-use crate::peripheral::{Peripheral, Unmodelled};
+use crate::peripheral::Peripheral;
 use crate::time::Time;
 pub use circuit::{Circuit, PORTS, Pin, Pins};
 pub use config::Config;
 use map::{BLOCKS, Block};
-use wires::SERIALS;
+use serial::SERIALS;
 
 /// The blocks, and the circuit at the pins.
 #[derive(Debug)]
@@ -41,7 +48,9 @@ pub struct Soc<C> {
     pub rcc: Rcc,
     /// The flash controller and its cells.
     pub flash: Flash,
-    /// Ports A to D.
+    /// The SRAM.
+    pub ram: Memory,
+    /// Ports A to E.
     pub gpio: [Gpio; PORTS],
     /// The circuit that is connected to the pins.
     pub circuit: C,
@@ -51,14 +60,17 @@ pub struct Soc<C> {
     afio: Afio,
     exti: Exti,
     iwdg: Iwdg,
-    usart1: Usart,
-    usart3: Usart,
+    /// The USARTs, in the order of [`SERIALS`].
+    usarts: [Usart; SERIALS.len()],
     tim1: Timer,
     tim2: Timer,
     tim3: Timer,
     tim4: Timer,
     adc1: Adc,
     i2c1: I2c,
+    can: Can,
+    dac: Dac,
+    dma: [Dma; 2],
     /// Levels of the ports that were passed on last.
     seen: [u16; PORTS],
     /// Mask of the I2C pins that the firmware pulls low as GPIO outputs.
@@ -92,15 +104,9 @@ pub struct Signals {
 }
 
 impl<C: Circuit> Soc<C> {
-    /// Returns USART1.
+    /// Returns the part after power-on, with this flash and SRAM, in `circuit`.
     #[must_use]
-    pub const fn usart1(&self) -> &Usart {
-        &self.usart1
-    }
-
-    /// Returns the part after power-on, with this flash, in `circuit`.
-    #[must_use]
-    pub fn new(config: &Config, flash: Flash, circuit: C) -> Self {
+    pub fn new(config: &Config, flash: Flash, ram: Memory, circuit: C) -> Self {
         let oscillators = config.corner.oscillators().with_crystal(config.crystal_hz);
         let rcc = Rcc::new(config.crystal, oscillators, config.part.clock_enables);
         let timer = |kind| Timer::new(kind).with_ug_delay(config.corner.ug_delay());
@@ -111,22 +117,25 @@ impl<C: Circuit> Soc<C> {
             rcc,
             flash,
             flash_access,
+            ram,
             // PC13 to PC15 are supplied through a switch for 3 mA, so they allow 2 MHz at most (DS5319 table 5, notes).
-            gpio: [0, 0, 0xE000, 0].map(Gpio::with_slow_pins),
+            gpio: [0, 0, 0xE000, 0, 0].map(Gpio::with_slow_pins),
             circuit,
             pwr: Pwr::default(),
             crc: Crc::default(),
             afio: Afio::default(),
             exti: Exti::default(),
             iwdg: Iwdg::new(oscillators.lsi),
-            usart1: Usart::default(),
-            usart3: Usart::default(),
+            usarts: Default::default(),
             tim1: timer(Kind::Advanced),
             tim2: timer(Kind::General),
             tim3: timer(Kind::General),
             tim4: timer(Kind::General),
             adc1: Adc::default(),
             i2c1: I2c::default(),
+            can: Can::default(),
+            dac: Dac::default(),
+            dma: [Dma::new(7), Dma::new(5)],
             seen: [0; PORTS],
             i2c_by_hand: 0,
             due: [Time::MAX; BLOCKS],
@@ -138,6 +147,7 @@ impl<C: Circuit> Soc<C> {
         };
         soc.adc1.set_noise(config.corner.adc_noise());
         soc.set_clocks(Time::ZERO);
+        soc.wire(Block::Afio, Time::ZERO);
         soc
     }
 
@@ -192,17 +202,16 @@ impl<C: Circuit> Soc<C> {
         }
         self.exchange_i2c(now);
         self.note_requests(Block::I2c1);
-        for block in [Block::I2c1, Block::Usart1, Block::Usart3, Block::Tim1] {
-            self.note_due(block);
-        }
-        self.find_next();
+        self.note_due(Block::I2c1);
+        self.wires_changed();
     }
 
     /// Takes over a change of the next edges at an RX pin.
     pub fn wires_changed(&mut self) {
-        for block in [Block::Usart1, Block::Usart3, Block::Tim1] {
-            self.note_due(block);
+        for serial in &SERIALS {
+            self.note_due(serial.usart);
         }
+        self.note_due(Block::Tim1);
         self.find_next();
     }
 
@@ -248,67 +257,16 @@ impl<C: Circuit> Soc<C> {
         self.due[source] = self.due[source].max(at + Time::from_ps(1));
     }
 
-    /// Reads the register of `block` at `offset` (word aligned).
-    ///
-    /// # Errors
-    ///
-    /// As [`Peripheral::read`].
-    pub fn read(&mut self, block: Block, offset: u32, now: Time) -> Result<u32, Unmodelled> {
-        self.catch_up(block, now);
-        let answer = self.block(block).read(offset, now);
-        self.settle(block, now);
-        self.find_next();
-        answer
-    }
-
-    /// Writes the register of `block` at `offset` (word aligned). The write is lost while RCC holds the block in reset.
-    ///
-    /// # Errors
-    ///
-    /// As [`Peripheral::write`].
-    pub fn write(
-        &mut self,
-        block: Block,
-        offset: u32,
-        value: u32,
-        now: Time,
-    ) -> Result<(), Unmodelled> {
-        let (apb2, apb1) = self.rcc.held_in_reset();
-        if apb2 | apb1 != 0
-            && block
-                .clock()
-                .is_some_and(|(bus, bit)| [apb2, apb1, 0][bus] >> bit & 1 != 0)
-        {
-            return Ok(());
-        }
-        self.catch_up(block, now);
-        let answer = self.block(block).write(offset, value, now);
-        self.settle(block, now);
-        self.find_next();
-        answer
-    }
-
-    /// Returns whether `block` has its clock (RM0008 7.3.7, 7.3.8).
-    #[must_use]
-    pub fn is_clocked(&self, block: Block) -> bool {
-        let enabled = self.rcc.enabled();
-        block
-            .clock()
-            .is_none_or(|(bus, bit)| enabled[bus] >> bit & 1 != 0)
-    }
-
-    /// Handles a store of the core to the flash at `offset`. `half` says whether it is a half-word.
-    pub fn program(&mut self, offset: u32, half: bool, value: u16, now: Time) {
-        self.flash.advance(now);
-        self.flash.program(offset, half, value, now);
-        self.settle(Block::Flash, now);
-        self.find_next();
-    }
-
     /// Computes a block and its wires up to `now`.
     fn catch_up(&mut self, block: Block, now: Time) {
         match block {
-            Block::Usart1 | Block::Usart3 | Block::GpioA | Block::GpioB => {
+            Block::Usart1
+            | Block::Usart2
+            | Block::Usart3
+            | Block::Uart4
+            | Block::GpioA
+            | Block::GpioB
+            | Block::GpioC => {
                 for serial in &SERIALS {
                     if serial.usart == block {
                         self.sync_wire(serial, now);
@@ -319,9 +277,9 @@ impl<C: Circuit> Soc<C> {
                 }
             }
             Block::Tim1 => {
-                self.sync_wire(wires::CAPTURED, now);
-                for (at, rising) in self.usart1.take_edges() {
-                    self.tim1.capture_edge(wires::RX_CAPTURE, at, rising);
+                self.sync_wire(serial::CAPTURED, now);
+                for (at, rising) in self.usarts[0].take_edges() {
+                    self.tim1.capture_edge(serial::RX_CAPTURE, at, rising);
                 }
                 self.tim1.advance(now);
             }
@@ -339,6 +297,7 @@ impl<C: Circuit> Soc<C> {
 
     /// Passes the outputs of a block on to other blocks, the circuit and the interrupt lines, and notes its next event.
     fn settle(&mut self, block: Block, now: Time) {
+        self.serve_dma(block, now);
         self.wire(block, now);
         self.note_requests(block);
         self.note_due(block);
@@ -347,14 +306,15 @@ impl<C: Circuit> Soc<C> {
     /// Notes the next event of a block.
     fn note_due(&mut self, block: Block) {
         let next = match block {
-            Block::Usart1 => self.next_exchange(&SERIALS[0]),
-            Block::Usart3 => self.next_exchange(&SERIALS[1]),
-            Block::Tim1 if self.tim1.capture_interrupt_enabled(wires::RX_CAPTURE) => {
-                let wire = self.circuit.wire(wires::CAPTURED.tx);
+            Block::Tim1 if self.tim1.capture_interrupt_enabled(serial::RX_CAPTURE) => {
+                let wire = self.circuit.wire(serial::CAPTURED.tx);
                 let edge = wire.and_then(|wire| wire.next_edge());
                 [self.tim1.next_event(), edge].into_iter().flatten().min()
             }
-            _ => self.block(block).next_event(),
+            _ => match SERIALS.iter().find(|serial| serial.usart == block) {
+                Some(serial) => self.next_exchange(serial),
+                None => self.block(block).next_event(),
+            },
         };
         self.due[block as usize] = next.unwrap_or(Time::MAX);
     }
@@ -370,7 +330,12 @@ impl<C: Circuit> Soc<C> {
             Block::Tim3 => &mut self.tim3,
             Block::Tim4 => &mut self.tim4,
             Block::Iwdg => &mut self.iwdg,
-            Block::Usart3 => &mut self.usart3,
+            Block::Usart1 => &mut self.usarts[0],
+            Block::Usart2 => &mut self.usarts[1],
+            Block::Usart3 => &mut self.usarts[2],
+            Block::Uart4 => &mut self.usarts[3],
+            Block::Can => &mut self.can,
+            Block::Dac => &mut self.dac,
             Block::I2c1 => &mut self.i2c1,
             Block::Afio => &mut self.afio,
             Block::Exti => &mut self.exti,
@@ -378,13 +343,15 @@ impl<C: Circuit> Soc<C> {
             Block::GpioB => &mut self.gpio[1],
             Block::GpioC => &mut self.gpio[2],
             Block::GpioD => &mut self.gpio[3],
+            Block::GpioE => &mut self.gpio[4],
             Block::Adc1 => &mut self.adc1,
             Block::Tim1 => &mut self.tim1,
-            Block::Usart1 => &mut self.usart1,
             Block::Rcc => &mut self.rcc,
             Block::Flash => &mut self.flash,
             Block::Pwr => &mut self.pwr,
             Block::Crc => &mut self.crc,
+            Block::Dma1 => &mut self.dma[0],
+            Block::Dma2 => &mut self.dma[1],
         }
     }
 }

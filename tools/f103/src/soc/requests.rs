@@ -31,6 +31,17 @@ impl<C: Circuit> Soc<C> {
                 }
                 return;
             }
+            Block::Dma1 | Block::Dma2 => {
+                let (n, lines): (_, &[(u16, u32)]) = match block {
+                    Block::Dma1 => (0, &irq::DMA1),
+                    _ => (1, &irq::DMA2),
+                };
+                let requests = self.dma[n].requests();
+                for &(line, channels) in lines {
+                    self.set_line(line, requests & channels != 0);
+                }
+                return;
+            }
             Block::I2c1 => {
                 self.set_line(irq::I2C1_EV, self.i2c1.irq_event());
                 self.set_line(irq::I2C1_ER, self.i2c1.irq_error());
@@ -45,7 +56,9 @@ impl<C: Circuit> Soc<C> {
             Block::Tim3 => irq::TIM3,
             Block::Tim4 => irq::TIM4,
             Block::Usart1 => irq::USART1,
+            Block::Usart2 => irq::USART2,
             Block::Usart3 => irq::USART3,
+            Block::Uart4 => irq::UART4,
             Block::Adc1 => irq::ADC1,
             Block::Flash => irq::FLASH,
             _ => return,

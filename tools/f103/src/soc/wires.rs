@@ -2,56 +2,20 @@
 //! table 5).
 
 use super::Soc;
-use super::circuit::{Circuit, PORTS, Pin};
+use super::circuit::{Circuit, Pin};
 use super::map::Block;
+use super::serial::SERIALS;
 use crate::finding::What;
 use crate::periph::clocks::Clocks;
+use crate::periph::gpio::DebugPins;
 use crate::periph::i2c::NoDevice;
 use crate::periph::rcc::Cause;
-use crate::periph::usart::{TxPin, Usart, Wire};
+use crate::periph::usart::TxPin;
 use crate::peripheral::Peripheral;
 use crate::time::Time;
 
-/// A USART and its pins, both on one port.
-#[derive(Debug)]
-pub(super) struct Serial {
-    pub(super) usart: Block,
-    pub(super) tx: Pin,
-    rx: Pin,
-    /// Finding when the receiver is on but the RX pin is not an input.
-    no_input: &'static str,
-}
-
-impl Serial {
-    /// Returns the port of the USART's pins.
-    pub(super) const fn port(&self) -> Block {
-        GPIO[self.tx.port_index()]
-    }
-}
-
-/// The blocks of the ports, from A on.
-const GPIO: [Block; PORTS] = [Block::GpioA, Block::GpioB, Block::GpioC, Block::GpioD];
-
-/// The USARTs that are modelled.
-pub(super) const SERIALS: [Serial; 2] = [
-    Serial {
-        usart: Block::Usart1,
-        tx: Pin::new('A', 9),
-        rx: Pin::new('A', 10),
-        no_input: "USART1 receives, but its RX pin is not a digital input",
-    },
-    Serial {
-        usart: Block::Usart3,
-        tx: Pin::new('B', 10),
-        rx: Pin::new('B', 11),
-        no_input: "USART3 receives, but its RX pin is not a digital input",
-    },
-];
-
-/// The USART whose RX pin is also a channel of TIM1.
-pub(super) const CAPTURED: &Serial = &SERIALS[0];
-/// The channel of TIM1 at this pin.
-pub(super) const RX_CAPTURE: usize = 3;
+/// The outputs of the DAC, on one port.
+const DAC_OUTPUTS: [Pin; 2] = [Pin::new('A', 4), Pin::new('A', 5)];
 
 /// I2C1's pins.
 const SCL: Pin = Pin::new('B', 6);
@@ -65,74 +29,20 @@ impl<C: Circuit> Soc<C> {
             Block::GpioB => self.wire_gpio(1, now),
             Block::GpioC => self.wire_gpio(2, now),
             Block::GpioD => self.wire_gpio(3, now),
+            Block::GpioE => self.wire_gpio(4, now),
+            Block::Afio => self.wire_debug(now),
+            Block::Dac => self.wire_dac(now),
+            Block::Dma1 => self.wire_dma(0, now),
+            Block::Dma2 => self.wire_dma(1, now),
             Block::Rcc => self.wire_rcc(now),
             Block::Flash => self.wire_flash(),
             Block::Iwdg => self.wire_watchdog(now),
-            Block::Usart1 => self.wire_usart(&SERIALS[0], now),
-            Block::Usart3 => self.wire_usart(&SERIALS[1], now),
-            _ => {}
-        }
-    }
-
-    /// Returns a USART and the device that is connected to it.
-    fn usart(&mut self, serial: &Serial) -> (&mut Usart, Option<&mut dyn Wire>) {
-        let usart = match serial.usart {
-            Block::Usart3 => &mut self.usart3,
-            _ => &mut self.usart1,
-        };
-        (usart, self.circuit.wire(serial.tx))
-    }
-
-    /// Computes a USART and its wire up to `now`.
-    pub(super) fn sync_wire(&mut self, serial: &Serial, now: Time) {
-        match self.usart(serial) {
-            (usart, Some(wire)) => usart.exchange(wire, now),
-            (usart, None) => {
-                usart.advance(now);
-                usart.take_sent();
+            _ => {
+                if let Some(serial) = SERIALS.iter().find(|serial| serial.usart == block) {
+                    self.wire_usart(serial, now);
+                }
             }
         }
-        for (at, text) in self.circuit.take_findings() {
-            self.notes.push((at, What::Other(text)));
-        }
-        if self.circuit.pins_changed() {
-            self.refresh(now);
-        }
-        self.note_requests(serial.usart);
-        self.note_due(serial.usart);
-    }
-
-    /// Returns the instant of the next event in a USART or at its RX pin.
-    pub(super) fn next_exchange(&mut self, serial: &Serial) -> Option<Time> {
-        match self.usart(serial) {
-            (usart, Some(wire)) => usart.next_exchange(wire),
-            (usart, None) => usart.next_event(),
-        }
-    }
-
-    /// Passes a character that has begun on to the wire, and reports a USART whose receiver is on while its RX pin is
-    /// not an input.
-    fn wire_usart(&mut self, serial: &Serial, now: Time) {
-        let port = &self.gpio[serial.rx.port_index()];
-        let closed = (port.outputs() | port.analog()) >> serial.rx.number() & 1 != 0;
-        let (usart, wire) = self.usart(serial);
-        let connected = wire.is_some();
-        if let Some(wire) = wire {
-            usart.pass_sent(wire);
-        }
-        if closed && connected && usart.awaits_start() {
-            self.notes.push((now, What::Other(serial.no_input)));
-        }
-    }
-
-    /// Drives the RX pin, for firmware that reads its level.
-    pub(super) fn drive_rx(&mut self, serial: &Serial, now: Time) {
-        let Some(wire) = self.circuit.wire(serial.tx) else {
-            return;
-        };
-        let drive = wire.rx_drive();
-        self.gpio[serial.rx.port_index()].drive(serial.rx.number(), drive, now);
-        self.wire_port(serial.rx.port_index(), now);
     }
 
     /// Passes the outputs of a port on to the wires and to the circuit.
@@ -184,6 +94,36 @@ impl<C: Circuit> Soc<C> {
             self.exti.pins(mine, level);
             self.note_requests(Block::Exti);
         }
+    }
+
+    /// Passes the pins of the debug port on to their ports.
+    fn wire_debug(&mut self, now: Time) {
+        // RM0008 9.3.5: JTMS, JTDI and NJTRST are pulled up, JTCK is pulled down, JTDO floats.
+        const PULLED_UP: [u16; 2] = [0b101 << 13, 1 << 4];
+        const PULLED_DOWN: [u16; 2] = [1 << 14, 0];
+        for (port, owned) in self.afio.debug_pins().into_iter().enumerate() {
+            let pins = DebugPins {
+                owned,
+                up: owned & PULLED_UP[port],
+                down: owned & PULLED_DOWN[port],
+            };
+            self.gpio[port].set_debug(pins, now);
+            self.wire_gpio(port, now);
+        }
+    }
+
+    /// Passes the outputs of the DAC on to their pins, and to the circuit.
+    fn wire_dac(&mut self, now: Time) {
+        let port = DAC_OUTPUTS[0].port_index();
+        for (n, pin) in DAC_OUTPUTS.into_iter().enumerate() {
+            let millivolts = self.dac.millivolts(n);
+            self.gpio[port].set_dac(pin.number(), millivolts);
+            if millivolts.is_some() && self.gpio[port].analog() >> pin.number() & 1 == 0 {
+                let text = "an output of the DAC is on, but its pin is not analog";
+                self.notes.push((now, What::Other(text)));
+            }
+        }
+        self.wire_gpio(port, now);
     }
 
     /// Passes on the use of PB6 and PB7: as pins of I2C1, or as GPIO outputs, with which the firmware frees a stuck
@@ -252,7 +192,9 @@ impl<C: Circuit> Soc<C> {
                 Block::Tim1 => clocks.apb2_timers,
                 Block::Tim2 | Block::Tim3 | Block::Tim4 => clocks.apb1_timers,
                 Block::Usart1 => clocks.pclk2,
-                Block::Usart3 | Block::I2c1 => clocks.pclk1,
+                Block::Usart2 | Block::Usart3 | Block::Uart4 | Block::I2c1 | Block::Can => {
+                    clocks.pclk1
+                }
                 Block::Adc1 => clocks.adc,
                 _ => continue,
             };

@@ -4,8 +4,8 @@
 
 use f103::Image;
 
-/// Address of the first instruction, after the vector table of 16 + 43 entries.
-const CODE: u32 = 0x0800_0100;
+/// Address of the first instruction, after a vector table with room for the 16 + 60 entries of the largest part.
+const CODE: u32 = 0x0800_0140;
 const STACK: u32 = 0x2000_5000;
 
 /// Condition of a branch.
@@ -184,7 +184,7 @@ impl Asm {
     pub fn image(mut self) -> Image {
         let idle = self.address() | 1;
         self.raw(0xE7FE);
-        let mut table = vec![idle; 64];
+        let mut table = vec![idle; 80];
         table[0] = STACK;
         table[1] = CODE | 1;
         for &(number, address) in &self.vectors {

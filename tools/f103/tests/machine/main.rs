@@ -6,6 +6,7 @@ mod costs;
 mod crystal;
 mod debug;
 mod flash;
+mod large;
 mod measure;
 mod parts;
 #[allow(dead_code, reason = "the tests of boards use the other registers")]

@@ -1,6 +1,6 @@
 //! Other parts of the family: their memories, pages, identity and pins.
 
-use f103::part::{Part, STM32F103C8, STM32F103CB, STM32F103RC};
+use f103::part::{Part, STM32F103C8, STM32F103CB, STM32F103RC, STM32F103VC};
 use f103::periph::gpio::Drive;
 use f103::soc::{Circuit, Pin, Pins};
 use f103::{Chip, Time, chip};
@@ -51,6 +51,7 @@ fn each_part_has_its_memories_and_its_identity() {
         (&STM32F103C8, 64, 0x410),
         (&STM32F103CB, 128, 0x410),
         (&STM32F103RC, 256, 0x414),
+        (&STM32F103VC, 256, 0x414),
     ] {
         let mut chip = alone(part, copies(&[FLASH_KIB, IDCODE]));
         chip.run_until(Time::from_ms(3));
@@ -101,8 +102,14 @@ fn code_in_the_upper_sram_of_a_high_density_part_runs() {
 
 #[test]
 fn a_block_of_larger_parts_is_reported_by_its_name() {
-    for (part, name) in [(&STM32F103CB, "reserved address"), (&STM32F103RC, "TIM5")] {
-        let mut chip = alone(part, copies(&[TIM5]));
+    for (part, address, name) in [
+        (&STM32F103CB, TIM5, "reserved address"),
+        (&STM32F103RC, TIM5, "TIM5"),
+        (&STM32F103CB, UART4, "reserved address"),
+        (&STM32F103CB, DMA2, "reserved address"),
+        (&STM32F103RC, UART4, "UART4"),
+    ] {
+        let mut chip = alone(part, copies(&[address]));
         chip.run_until(Time::from_ms(3));
         assert!(findings(&chip)[0].contains(name), "{:?}", findings(&chip));
     }

@@ -18,9 +18,9 @@ from .board import Board
 from .errors import RefusedError, SimulatorError, StartError, UnreachableError
 from .events import Events
 from .simulator import Simulator
-from .model import BoardInfo, Channel, Faults, Finding, Frame, Leds, Line, Lost, Radio, Slot, State
+from .model import BoardInfo, Channel, Faults, Finding, Frame, Leds, Line, Lost, Radio, Slot, State, Terminal
 
 __all__ = [
     "Board", "BoardInfo", "Channel", "Events", "Faults", "Finding", "Frame", "Leds", "Line", "Lost", "Radio",
-    "RefusedError", "Simulator", "SimulatorError", "Slot", "StartError", "State", "UnreachableError",
+    "RefusedError", "Simulator", "SimulatorError", "Slot", "StartError", "State", "Terminal", "UnreachableError",
 ]

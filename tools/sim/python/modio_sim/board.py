@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from typing import Any, Callable, List, Optional
+from urllib.parse import quote
 
 from .connection import Http
 from .model import Faults, Finding, Frame, Json, State, taken
@@ -46,6 +47,20 @@ class Board:
         if len(body) != 1:
             raise ValueError("give one of energised, manual and millivolts")
         return self._post(f"{_slot(port)}channels/{_number('channel', channel)}", body)
+
+    def set_terminal(
+        self, name: str, *, energised: Optional[bool] = None, millivolts: Optional[int] = None,
+        microamperes: Optional[int] = None, permille: Optional[int] = None, high: Optional[bool] = None,
+        present: Optional[bool] = None,
+    ) -> State:
+        """Applies a value to a terminal of a board with fixed inputs and outputs, such as "X0". Exactly one value must
+        be given, of the kind of the terminal, as in `Terminal`."""
+        given = {"energised": energised, "millivolts": millivolts, "microamperes": microamperes, "permille": permille,
+                 "high": high, "present": present}
+        body = {key: value for key, value in given.items() if value is not None}
+        if len(body) != 1:
+            raise ValueError(f"give one of {', '.join(given)}")
+        return self._post(f"terminals/{quote(name, safe='')}", body)
 
     def set_dip(self, value: int) -> State:
         """Moves the DIP switch; the firmware reads it at the next power-on."""

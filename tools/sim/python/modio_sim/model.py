@@ -73,6 +73,28 @@ class Slot:
 
 
 @dataclass(frozen=True)
+class Terminal:
+    """A terminal of a board with fixed inputs and outputs. Fields that its kind does not have are None."""
+
+    name: str
+    """Name on the board, such as "X0"."""
+    kind: str
+    """"input", "relay", "voltage", "current", "potentiometer", "output", "switch" or "supply"."""
+    energised: Optional[bool] = None
+    """Of a digital input: voltage is applied. Of a relay: its coil is energised."""
+    millivolts: Optional[int] = None
+    """Of a voltage input, 0 to 12000, and of an analog output: voltage at the terminal in mV."""
+    microamperes: Optional[int] = None
+    """Of a current input: current in uA, 0 to 25000."""
+    permille: Optional[int] = None
+    """Of a potentiometer: position in thousandths, 0 to 1000."""
+    high: Optional[bool] = None
+    """Of a switch: its pin is connected to the supply, not to ground."""
+    present: Optional[bool] = None
+    """Of the monitor of the 24 V supply."""
+
+
+@dataclass(frozen=True)
 class Radio:
     """The LoRa module of a board."""
 
@@ -102,8 +124,8 @@ class State:
     dip: int
     """The DIP switch as a number."""
     address: Optional[int]
-    """The unit address in force: the DIP switch at the last power-on. None without power, and when the position is no
-    address."""
+    """The unit address in force: the DIP switch at the last power-on. None without power, when the position is no
+    address, and on a board without a switch."""
     module: str
     """The module in the first slot."""
     configured: str
@@ -118,6 +140,8 @@ class State:
     """The last lines of the firmware's log."""
     slots: Tuple[Slot, ...] = ()
     """All slots of a board that has several; empty for a board with one."""
+    terminals: Tuple[Terminal, ...] = ()
+    """The terminals of a board with fixed inputs and outputs, in their order; empty for any other board."""
     radio: Optional[Radio] = None
     """The LoRa module; None if it is not fitted."""
     running_slot: Optional[str] = None
@@ -134,6 +158,7 @@ class State:
             "channels": channels(data),
             "log_tail": tuple(data["log_tail"]),
             "slots": tuple(Slot.from_json(slot) for slot in data.get("slots", ())),
+            "terminals": tuple(taken(Terminal, terminal) for terminal in data.get("terminals", ())),
             "radio": taken(Radio, data["radio"]) if "radio" in data else None,
         })
 
@@ -143,6 +168,13 @@ class State:
             if slot.port == port:
                 return slot
         raise KeyError(f"the board has no slot at port {port}")
+
+    def terminal(self, name: str) -> Terminal:
+        """Returns the terminal with this name. KeyError when there is none."""
+        for terminal in self.terminals:
+            if terminal.name == name:
+                return terminal
+        raise KeyError(f"the board has no terminal {name}")
 
 
 def channels(data: Mapping[str, Any]) -> Tuple[Channel, ...]:

@@ -32,7 +32,8 @@ CALLS = {
     "openapi": [{}], "power_cycle": [{}], "power_off": [{}], "power_on": [{}],
     "set_channel": [{"channel": 4, "energised": True}, {"channel": 4, "manual": True, "port": 1}],
     "set_dip": [{"value": 5}], "set_faults": [{"faults": {"drop_rate": 0.5}}],
-    "set_module": [{"name": "4do"}, {"name": "4do", "port": 1}], "state": [{}],
+    "set_module": [{"name": "4do"}, {"name": "4do", "port": 1}],
+    "set_terminal": [{"name": "X0", "energised": True}], "state": [{}],
 }
 # Methods that make no request, or make requests only through others.
 OTHERS = {"attach", "close", "endpoint", "start", "wait", "wait_for"}
@@ -69,6 +70,14 @@ def called(simulator, board):
 def matches(template, path):
     """Returns whether a path matches a template such as `/api/channels/{channel}`."""
     return re.fullmatch(re.sub(r"\\{[^/]+\\}", "[^/]+", re.escape(template)), path)
+
+
+def members_of(schemas, schema):
+    """Returns the names of all members that a schema describes."""
+    if "$ref" in schema:
+        return members_of(schemas, schemas[schema["$ref"].rpartition("/")[2]])
+    parts = schema.get("oneOf", []) + schema.get("allOf", [])
+    return set(schema.get("properties", ())).union(*(members_of(schemas, part) for part in parts))
 
 
 class Paths(unittest.TestCase):
@@ -128,9 +137,8 @@ class Types(unittest.TestCase):
         for schema, of in (("State", modio_sim.State), ("Slot", modio_sim.Slot), ("Channel", modio_sim.Channel),
                            ("Frame", modio_sim.Frame), ("Finding", modio_sim.Finding), ("Board", modio_sim.BoardInfo),
                            ("Faults", modio_sim.Faults), ("Leds", modio_sim.Leds), ("Line", modio_sim.Line),
-                           ("Radio", modio_sim.Radio)):
-            kinds = schemas[schema].get("oneOf", [schemas[schema]])
-            members = {name for kind in kinds for name in kind["properties"]}
+                           ("Radio", modio_sim.Radio), ("Terminal", modio_sim.Terminal)):
+            members = members_of(schemas, schemas[schema])
             fields = typing.get_type_hints(of).keys()
             self.assertEqual(members - fields, set(), f"{of.__name__} does not have these fields")
 
@@ -141,6 +149,11 @@ class Types(unittest.TestCase):
         self.assertIsNone(state.radio)
         with self.assertRaises(KeyError):
             state.slot(5)
+        terminal = {"name": "AD0", "kind": "voltage", "millivolts": 5000, "colour": "green"}
+        state = modio_sim.State.from_json({**STATE, "terminals": [terminal]})
+        self.assertEqual(state.terminal("AD0").millivolts, 5000)
+        with self.assertRaises(KeyError):
+            state.terminal("AD1")
 
 
 class Package(unittest.TestCase):

@@ -4,6 +4,7 @@ use register_map::Module;
 use utoipa::ToSchema;
 
 use super::faults::Faults;
+use super::terminals::Applied;
 
 /// An action on a board.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,6 +17,13 @@ pub enum Action {
         channel: usize,
         /// The change.
         change: Change,
+    },
+    /// Applies a value to a terminal of a board with fixed inputs and outputs.
+    Terminal {
+        /// Name of the terminal.
+        name: String,
+        /// What is applied.
+        applied: Applied,
     },
     /// Moves the DIP switch.
     Dip(u8),

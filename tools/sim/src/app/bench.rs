@@ -132,7 +132,7 @@ impl Bench {
     /// The reason why the board refuses the action. Nothing has changed then.
     pub fn apply(&mut self, n: usize, action: &Action) -> Result<(), Error> {
         let board = self.bus.board_mut(n);
-        let first = board.layout().slots[0].port;
+        let first = board.first_port();
         match *action {
             Action::Channel {
                 port,
@@ -143,6 +143,7 @@ impl Bench {
                 Change::Manual(on) => slot.set_manual(channel, on),
                 Change::Millivolts(millivolts) => slot.set_millivolts(channel, millivolts),
             })??,
+            Action::Terminal { ref name, applied } => board.set_terminal(name, applied.into())?,
             Action::Dip(dip) => board.set_dip(dip),
             Action::PowerOn => board.power_on(),
             Action::PowerOff => board.power_off(),

@@ -22,10 +22,10 @@ pub fn file(board: &Board, ending: &str) -> Option<Vec<u8>> {
 /// Returns the version of the program, and on a line for each board inside it the version of its firmware.
 pub fn version() -> String {
     let mut text = format!("modio-sim {}\n", register_map::version!());
-    for layout in Layout::ALL {
-        if let Some(elf) = file(layout.board, ".elf") {
+    for board in Board::ALL {
+        if let (Some(layout), Some(elf)) = (Layout::of(board), file(board, ".elf")) {
             let version = firmware(layout, &elf).unwrap_or_else(|| "of unknown version".to_owned());
-            text += &format!("firmware of the {}: {version}\n", layout.board);
+            text += &format!("firmware of the {board}: {version}\n");
         }
     }
     text

@@ -47,6 +47,7 @@ mod run;
 mod scenario;
 mod state;
 mod tcp;
+mod terminals;
 #[cfg(test)]
 mod testing;
 mod unit;

@@ -11,6 +11,7 @@ use utoipa::{PartialSchema, ToSchema};
 
 use super::bench::Bench;
 use super::faults::{Faults, HSI_HZ};
+use super::terminals::{self, Terminal};
 
 /// The state of a board.
 #[derive(Serialize, ToSchema)]
@@ -22,8 +23,8 @@ pub struct State {
     powered: bool,
     #[schema(maximum = 255)]
     dip: u8,
-    /// Unit address in force: the DIP switch at the last power-on. `null` without power, and for a position that is no
-    /// address.
+    /// Unit address in force: the DIP switch at the last power-on. `null` without power, for a position that is no
+    /// address, and on a board without a switch.
     #[schema(required, minimum = 1, maximum = 255)]
     address: Option<u8>,
     /// Slot of the flash whose image runs, `A` or `B`. `null` without power, in the loader, and for an image that runs
@@ -46,6 +47,9 @@ pub struct State {
     /// The slots, only of a board with several slots.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     slots: Vec<OneSlot>,
+    /// The terminals in their order, only of a board with fixed inputs and outputs.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    terminals: Vec<Terminal>,
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     radio: Option<Radio>,
@@ -150,8 +154,8 @@ pub struct OneBoard {
     board: &'static str,
     #[schema(maximum = 255)]
     dip: u8,
-    /// Unit address in force: the DIP switch at the last power-on. `null` without power, and for a position that is no
-    /// address.
+    /// Unit address in force: the DIP switch at the last power-on. `null` without power, for a position that is no
+    /// address, and on a board without a switch.
     #[schema(required, minimum = 1, maximum = 255)]
     address: Option<u8>,
     powered: bool,
@@ -241,7 +245,10 @@ pub fn of_board(bench: &mut Bench, n: usize) -> State {
             FlashSlot::B => "B",
         }),
         module: board.module().into(),
-        configured: configured(board, board.layout().slots[0].port),
+        configured: match board.layout().slots.first() {
+            Some(slot) => configured(board, slot.port),
+            None => Module::None.into(),
+        },
         leds: Leds {
             activity: leds.activity,
             fault: leds.fault,
@@ -254,9 +261,10 @@ pub fn of_board(bench: &mut Bench, n: usize) -> State {
             rx_frames,
             tx_frames,
         },
-        channels: channels(board.slot()),
+        channels: [1, 2, 3, 4].map(|number| board.channel(number).into()),
         log_tail: bench.units[n].log_tail().map(str::to_owned).collect(),
         slots,
+        terminals: terminals::of_board(board),
         radio: board.radio().map(radio),
     }
 }
@@ -315,8 +323,12 @@ fn radio(module: &radio::Module) -> Radio {
     }
 }
 
-/// Returns the unit address in force; `None` without power, and if the switch had no valid position at power-on.
+/// Returns the unit address in force by the switch; `None` without power, without a switch, and if the switch had no
+/// valid position at power-on.
 fn address(board: &Board) -> Option<u8> {
+    if board.layout().switch.is_empty() {
+        return None;
+    }
     let dip = board.dip_at_power_on();
     (board.powered() && matches!(dip, 1..=247 | 255)).then_some(dip)
 }

@@ -2,19 +2,21 @@
 
 use register_map::Module;
 
-use super::{Board, Error, Layout};
+use super::layout::Led;
+use super::terminals::{Terminals, Value};
+use super::{Board, Error, Layout, Rs232};
 use crate::line::Line;
 use crate::radio::{self, Air};
 use crate::slot::{BusFault, Channel, Slot};
 
-/// The three LEDs; `true` = lit.
+/// The three LEDs; `true` = lit. An LED that the board does not have is off.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Leds {
-    /// Line activity: PB8, high = on.
+    /// Line activity.
     pub activity: bool,
-    /// Fault: PB9, high = on.
+    /// Fault.
     pub fault: bool,
-    /// Running: PC13, low = on.
+    /// Running.
     pub run: bool,
 }
 
@@ -42,10 +44,13 @@ impl Board {
         self.circuit().layout
     }
 
-    /// Returns the module in the first slot.
+    /// Returns the module in the first slot; [`Module::None`] if the board has no slot.
     #[must_use]
     pub fn module(&self) -> Module {
-        self.slot().module()
+        self.circuit()
+            .slots
+            .first()
+            .map_or(Module::None, Slot::module)
     }
 
     /// Plugs a new module into the first slot.
@@ -54,7 +59,13 @@ impl Board {
     ///
     /// [`f103::Error::Powered`] while the power is on.
     pub fn set_module(&mut self, module: Module) -> Result<(), Error> {
-        self.set_module_at(self.layout().slots[0].port, module)
+        self.set_module_at(self.first_port(), module)
+    }
+
+    /// Returns the port of the first slot; 1 if the board has no slot.
+    #[must_use]
+    pub fn first_port(&self) -> u8 {
+        self.layout().slots.first().map_or(1, |slot| slot.port)
     }
 
     /// Plugs a new module into the slot at `port`.
@@ -107,16 +118,25 @@ impl Board {
 
     /// Causes or clears a fault of the I2C bus in the first slot.
     pub fn set_bus_fault(&mut self, fault: BusFault) {
-        self.with_slot(|slot| slot.set_bus_fault(fault));
+        // A board without a slot has no DAC that could fail.
+        let _ = self.with_slot(|slot| {
+            slot.set_bus_fault(fault);
+            Ok(())
+        });
     }
 
     /// Returns the state of channel `ch` (1 to 4) of the first slot; [`Channel::None`] for any other number.
     #[must_use]
     pub fn channel(&self, ch: usize) -> Channel {
-        self.slot().channel(ch)
+        let slot = self.circuit().slots.first();
+        slot.map_or(Channel::None, |slot| slot.channel(ch))
     }
 
     /// Returns the first slot, for reading.
+    ///
+    /// # Panics
+    ///
+    /// If the board has no slot.
     #[must_use]
     pub fn slot(&self) -> &Slot {
         &self.circuit().slots[0]
@@ -146,32 +166,62 @@ impl Board {
         Ok(self.change(|circuit| action(&mut circuit.slots[n])))
     }
 
-    fn with_slot<T>(&mut self, action: impl FnOnce(&mut Slot) -> T) -> T {
-        self.change(|circuit| action(&mut circuit.slots[0]))
+    fn with_slot(
+        &mut self,
+        action: impl FnOnce(&mut Slot) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        self.change_slot(self.first_port(), action)?
+    }
+
+    /// Returns the terminals with their states.
+    #[must_use]
+    pub fn terminals(&self) -> &Terminals {
+        &self.circuit().terminals
+    }
+
+    /// Applies `value` to the terminal `name` at this instant.
+    ///
+    /// # Errors
+    ///
+    /// As [`Terminals::set`].
+    pub fn set_terminal(&mut self, name: &str, value: Value) -> Result<(), Error> {
+        self.change(|circuit| circuit.terminals.set(name, value))
+    }
+
+    /// Returns the RS-232 port; `None` if the board has none.
+    pub fn rs232(&mut self) -> Option<&mut Rs232> {
+        self.sync();
+        self.circuit_mut().rs232.as_mut()
     }
 
     /// Returns the LEDs.
     #[must_use]
     pub fn leds(&self) -> Leds {
-        // Without power PC13 is low, as with the LED on, but the LED is off.
+        // A pin that is not an output lights no LED, whatever its level is.
+        let lit = |led: Led| {
+            let (port, number) = (led.pin.port(), led.pin.number() as u8);
+            let high = self.pin(port, number);
+            self.powered() && self.is_output(port, number) && high == led.lit_by
+        };
+        let leds = &self.layout().leds;
         Leds {
-            activity: self.pin('B', 8),
-            fault: self.pin('B', 9),
-            run: self.powered() && self.is_output('C', 13) && !self.pin('C', 13),
+            activity: leds.activity.is_some_and(lit),
+            fault: leds.fault.is_some_and(lit),
+            run: lit(leds.run),
         }
     }
 
-    /// Returns whether the RS-485 driver is on (PA8).
+    /// Returns whether the RS-485 driver is on.
     #[must_use]
     pub fn driver_enable(&self) -> bool {
-        self.pin('A', 8)
+        self.circuit().line.driver()
     }
 
-    /// Returns the number of writes to USART1's data register since the last reset: one for each byte that the firmware
+    /// Returns the number of writes to the data register of the line's USART since the last reset: one for each byte that the firmware
     /// sends.
     #[must_use]
     pub fn line_bytes_written(&self) -> u64 {
-        self.usart1().data_writes()
+        self.usart(self.layout().line.tx).data_writes()
     }
 
     /// Returns the RS-485 line, for sending and for reading the record.

@@ -272,7 +272,7 @@ impl Board {
 
     /// Returns the unit's output to the bus; `None` if it is as in the last call.
     fn take_output(&mut self) -> Option<Output> {
-        if !(self.usart1().has_sent() || self.circuit().line.has_changed()) {
+        if !(self.usart(self.layout().line.tx).has_sent() || self.circuit().line.has_changed()) {
             return None;
         }
         self.sync();
@@ -287,7 +287,7 @@ impl Board {
 
     /// Returns the rate and format of the unit, for a master that follows it; `None` while the power is off.
     fn line_settings(&self) -> Option<Settings> {
-        let usart = self.usart1();
+        let usart = self.usart(self.layout().line.tx);
         self.powered().then(|| usart.settings()).flatten()
     }
 }

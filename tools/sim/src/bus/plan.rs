@@ -72,7 +72,7 @@ impl Board {
     /// Returns the next actions of the board.
     pub(super) fn plan(&self) -> Plan {
         let awake = self.next_instruction();
-        let usart = self.usart1();
+        let usart = self.usart(self.layout().line.tx);
         let start = match usart.earliest_start(awake) {
             _ if awake == Time::MAX => awake,
             Some(start) => start,

@@ -60,7 +60,7 @@ pub struct Line {
     master: Master,
     /// Low while noise inverts the bus.
     noise: Wave,
-    /// The TX pin as USART1 drives it.
+    /// The TX pin as the unit's USART drives it.
     usart: Wave,
     last_sent: Option<Span>,
     tx_pin: TxPin,

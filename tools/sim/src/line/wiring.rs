@@ -117,7 +117,7 @@ impl Line {
         self.driver
     }
 
-    /// Takes over the output of USART1 at its TX pin.
+    /// Takes over the output of the unit's USART at its TX pin.
     fn put(&mut self, sent: Sent) {
         self.shared.changed = true;
         sent.put_on(&mut self.usart);
@@ -130,12 +130,12 @@ impl Line {
                 if self.tx_pin != TxPin::Usart {
                     self.findings.push((
                         character.start,
-                        "USART1 sent a character while its TX pin was not an alternate function",
+                        "the USART sent a character while its TX pin was not an alternate function",
                     ));
                 } else if !self.driver {
                     self.findings.push((
                         character.start,
-                        "USART1 sent a character while the RS-485 driver was off: it is lost",
+                        "the USART sent a character while the RS-485 driver was off: it is lost",
                     ));
                 }
             }

@@ -37,15 +37,15 @@ mod packet;
 mod parameters;
 mod sending;
 pub mod timing;
-mod uart;
 
 #[cfg(test)]
 mod tests;
 
+pub use crate::uart::Byte;
 pub use air::Air;
 pub(crate) use air::tell;
 pub use module::{Fault, Module};
 pub(crate) use packet::News;
 pub use packet::{Packet, Sender};
+pub(crate) use parameters::SLEEP_UART;
 pub use parameters::{Mode, Parameters};
-pub use uart::Byte;

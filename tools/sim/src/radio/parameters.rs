@@ -47,7 +47,7 @@ impl Mode {
 }
 
 /// Rate and format of the UART in sleep, whatever is set.
-pub(super) const SLEEP_UART: Settings = Settings {
+pub(crate) const SLEEP_UART: Settings = Settings {
     baud: 9600,
     format: Format::N1,
 };

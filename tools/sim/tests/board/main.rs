@@ -4,6 +4,7 @@
 #[allow(dead_code, reason = "the tests of the core use all of the assembler")]
 mod asm;
 mod echo;
+mod fx3u;
 mod radio;
 mod radio_bus;
 #[path = "../../../f103/tests/machine/regs.rs"]
@@ -11,6 +12,7 @@ mod radio_bus;
 mod regs;
 mod slots;
 mod wires;
+mod witness;
 
 use asm::Asm;
 use sim::{Board, Config, Image, Time};

@@ -27,7 +27,7 @@ fn event(bench: &mut Bench) -> u32 {
     let log = bench.board.take_log();
     let time = log
         .strip_prefix('[')
-        .and_then(|log| log.strip_suffix("] WARN line: set up again after a disturbance\n"))
+        .and_then(|log| log.strip_suffix("] WARN line: set up again\n"))
         .unwrap_or_else(|| panic!("{log:?}"));
     let (seconds, millis) = time.split_once('.').expect("a decimal point");
     assert_eq!(millis.len(), 3, "{time}");

@@ -1,5 +1,4 @@
-//! ADC1: the regular sequence, started by software, without DMA, injected channels and watchdog
-//! (RM0008 11).
+//! ADC1: the regular sequence, started by software, without injected channels and watchdog (RM0008 11).
 //!
 //! The converter is clocked by ADCCLK. Inputs are levels in millivolts against 3300 mV of VDDA. Misuse that makes
 //! a real converter inaccurate without an error flag is reported: a clock above 14 MHz, a start before the
@@ -12,6 +11,7 @@
 //! sheet (DS5319, ADC characteristics): RAIN < TS / (fADC x CADC x ln 2^14) - RADC for an error below a quarter of
 //! a step.
 
+mod bits;
 mod sequence;
 
 #[cfg(test)]
@@ -19,53 +19,8 @@ mod tests;
 
 use crate::peripheral::{Peripheral, Unmodelled};
 use crate::time::Time;
+use bits::{cr1, cr2, offset, sr};
 use sequence::{Run, Sequence};
-
-/// Offsets, RM0008 11.12.15.
-mod offset {
-    pub const SR: u32 = 0x00;
-    pub const CR1: u32 = 0x04;
-    pub const CR2: u32 = 0x08;
-    pub const SMPR1: u32 = 0x0C;
-    pub const SMPR2: u32 = 0x10;
-    pub const HTR: u32 = 0x24;
-    pub const LTR: u32 = 0x28;
-    pub const SQR1: u32 = 0x2C;
-    pub const SQR2: u32 = 0x30;
-    pub const SQR3: u32 = 0x34;
-    pub const DR: u32 = 0x4C;
-}
-
-/// SR, 11.12.1.
-mod sr {
-    pub const EOC: u32 = 1 << 1;
-    pub const STRT: u32 = 1 << 4;
-}
-
-/// CR1, 11.12.2.
-mod cr1 {
-    pub const EOCIE: u32 = 1 << 5;
-    pub const SCAN: u32 = 1 << 8;
-    pub const MASK: u32 = 0x00CF_FFFF;
-    /// Bits without an effect while the features below are off.
-    pub const IDLE: u32 = 0xE01F;
-}
-
-/// CR2, 11.12.3.
-mod cr2 {
-    pub const ADON: u32 = 1 << 0;
-    pub const CONT: u32 = 1 << 1;
-    pub const CAL: u32 = 1 << 2;
-    pub const RSTCAL: u32 = 1 << 3;
-    pub const ALIGN: u32 = 1 << 11;
-    pub const EXTSEL: u32 = 7 << 17;
-    pub const EXTTRIG: u32 = 1 << 20;
-    pub const SWSTART: u32 = 1 << 22;
-    pub const TSVREFE: u32 = 1 << 23;
-    pub const MASK: u32 = 0x00FE_F90F;
-    pub const MODELLED: u32 =
-        ADON | CONT | CAL | RSTCAL | ALIGN | EXTSEL | EXTTRIG | SWSTART | TSVREFE;
-}
 
 /// The inputs: 16 pins, the temperature sensor and the internal reference.
 const CHANNELS: usize = 18;
@@ -116,6 +71,8 @@ pub struct Adc {
     /// The bit to be cleared then, CAL or RSTCAL.
     calibration: Option<(u32, Time)>,
     run: Option<Run>,
+    /// A code waits for the DMA.
+    dma_request: bool,
     /// Largest error of a conversion, in LSB either way, followed by the state of the generator that picks the
     /// error (xorshift32).
     noise: u16,
@@ -145,6 +102,7 @@ impl Default for Adc {
             powered_at: Time::ZERO,
             calibration: None,
             run: None,
+            dma_request: false,
             noise: 0,
             random: 0x6D6F_6469,
         }
@@ -265,7 +223,7 @@ impl Adc {
         }
         if value & !cr2::MODELLED != 0 {
             return Err(Unmodelled(
-                "ADC DMA, injected channels or external trigger (CR2)",
+                "ADC injected channels or external trigger (CR2)",
             ));
         }
         let fresh = value & !running;
@@ -299,6 +257,8 @@ impl Adc {
         } else {
             code << 4
         };
+        // 11.8: each conversion of a sequence requests a transfer.
+        self.dma_request = self.cr2 & cr2::DMA != 0;
         let scan = self.cr1 & cr1::SCAN != 0;
         let last = !scan || run.rank + 1 >= self.sequence.length();
         if last {
@@ -332,6 +292,7 @@ impl Peripheral for Adc {
             offset::SQR3 => self.sequence.sqr[2],
             offset::DR => {
                 self.sr &= !sr::EOC;
+                self.dma_request = false;
                 u32::from(self.data)
             }
             _ => return Err(Unmodelled("ADC register")),
@@ -365,8 +326,9 @@ impl Peripheral for Adc {
     }
 
     fn next_event(&self) -> Option<Time> {
-        // Only an interrupt is an event; everything else is calculated when a register is read.
-        let waits = self.cr1 & cr1::EOCIE != 0 && self.sr & sr::EOC == 0;
+        // Only an interrupt and a transfer are events; everything else is calculated when a register is read.
+        let interrupts = self.cr1 & cr1::EOCIE != 0 && self.sr & sr::EOC == 0;
+        let waits = interrupts || self.cr2 & cr2::DMA != 0;
         self.run.filter(|_| waits).map(|run| run.end())
     }
 
@@ -392,6 +354,10 @@ impl Peripheral for Adc {
             }
             self.finish(run);
         }
+    }
+
+    fn dma_requests(&self) -> [bool; 2] {
+        [self.dma_request, false]
     }
 
     fn irq(&self) -> bool {

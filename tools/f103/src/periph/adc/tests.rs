@@ -140,12 +140,36 @@ fn internal_channels_have_their_typical_values() {
 }
 
 #[test]
+fn each_conversion_of_a_continuous_scan_requests_a_transfer() {
+    let (mut adc, t) = settled();
+    adc.set_millivolts(1, 1650, t);
+    write(&mut adc, offset::CR1, cr1::SCAN, t);
+    write(&mut adc, offset::SQR1, 1 << 20, t);
+    write(&mut adc, offset::SQR3, 1 << 5, t);
+    let on = ON | cr2::DMA | cr2::CONT;
+    write(&mut adc, offset::CR2, on, t);
+    write(&mut adc, offset::CR2, on | cr2::SWSTART, t);
+    for (n, code) in [(1, 0), (2, 2048), (3, 0), (4, 2048)] {
+        // 1.5 + 12.5 cycles.
+        let end = t + cycles(14 * n);
+        assert_eq!(
+            (adc.next_event(), adc.dma_requests()[0]),
+            (Some(end), false)
+        );
+        adc.advance(end);
+        assert!(adc.dma_requests()[0]);
+        assert_eq!(adc.read(offset::DR, end), Ok(code));
+    }
+}
+
+#[test]
 fn misuse_is_reported() {
     let mut adc = Adc::default();
     adc.set_clock(18_000_000, Time::ZERO);
     let now = Time::from_us(10);
     assert!(adc.write(offset::CR2, cr2::SWSTART, now).is_err(), "off");
-    assert!(adc.write(offset::CR2, ON | 1 << 8, now).is_err(), "DMA");
+    let injected = adc.write(offset::CR2, ON | 1 << 15, now);
+    assert!(injected.is_err(), "JEXTTRIG");
     assert!(adc.write(offset::CR2, ON, now).is_ok());
     let start = ON | cr2::SWSTART;
     let fast = adc.write(offset::CR2, start, now + Time::from_us(5));

@@ -5,6 +5,8 @@
 //! Levels are calculated for the whole port together, as bit masks. A pin that is driven neither inside nor
 //! outside reads low. A real floating pin reads either level; low is the worst case for an active-low input.
 
+mod lock;
+
 use crate::peripheral::{Peripheral, Unmodelled};
 use crate::time::Time;
 
@@ -27,7 +29,6 @@ pub enum Drive {
 /// Lowest voltage that a digital input reads as high: between VIL and VIH (DS5319 table 35), at half the supply.
 const THRESHOLD_MV: u16 = 1650;
 const CRL_RESET: u32 = 0x4444_4444;
-const LCKK: u32 = 1 << 16;
 
 /// A port's registers and pins.
 #[derive(Debug)]
@@ -46,6 +47,9 @@ pub struct Gpio {
     watched: u16,
     /// Pins whose outputs may not be faster than 2 MHz, one bit each.
     slow: u16,
+    debug: DebugPins,
+    /// Voltage of the DAC's output at each pin that has one and is analog, in millivolts.
+    dac: [Option<u16>; 16],
     edges: [Vec<(Time, bool)>; 16],
 }
 
@@ -57,6 +61,17 @@ struct Modes {
     alternate: u16,
     analog: u16,
     pulled: u16,
+}
+
+/// Pins that the debug port owns, whatever the port's registers say (RM0008 9.3.5), one bit each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DebugPins {
+    /// All of them.
+    pub owned: u16,
+    /// Pins with a pull-up.
+    pub up: u16,
+    /// Pins with a pull-down.
+    pub down: u16,
 }
 
 /// Pins by how the outside drives them, one bit each.
@@ -82,6 +97,8 @@ impl Default for Gpio {
             contention: 0,
             watched: 0,
             slow: 0,
+            debug: DebugPins::default(),
+            dac: [None; 16],
             edges: Default::default(),
         }
     }
@@ -117,6 +134,32 @@ impl Gpio {
         self.modes.output
     }
 
+    /// Sets the pins that the debug port owns.
+    pub fn set_debug(&mut self, pins: DebugPins, now: Time) {
+        if pins != self.debug {
+            self.debug = pins;
+            self.decode();
+            self.settle(now);
+        }
+    }
+
+    /// Sets the voltage of the DAC's output at `pin` in millivolts; `None` while the output is off.
+    pub fn set_dac(&mut self, pin: usize, millivolts: Option<u16>) {
+        self.dac[pin] = millivolts;
+    }
+
+    /// Returns the voltage of the DAC's output at `pin` in millivolts; `None` while the output is off, or the pin is not
+    /// analog.
+    #[must_use]
+    pub fn dac(&self, pin: usize) -> Option<u16> {
+        self.dac[pin].filter(|_| self.modes.analog >> pin & 1 != 0)
+    }
+
+    /// Returns the levels that outputs and pulls give their pins, one bit each.
+    fn value(&self) -> u16 {
+        self.odr & !self.debug.owned | self.debug.up | self.modes.alternate
+    }
+
     /// Returns the pins handed to a peripheral's output (alternate function), one bit each.
     #[must_use]
     pub fn alternate_outputs(&self) -> u16 {
@@ -139,7 +182,7 @@ impl Gpio {
     #[must_use]
     pub fn held(&self, pin: usize) -> Option<bool> {
         let bit = 1 << pin;
-        let high = (self.odr | self.modes.alternate) & bit != 0;
+        let high = self.value() & bit != 0;
         let released = self.modes.open_drain & bit != 0 && high;
         let held = self.modes.output & bit != 0 && !released || self.modes.pulled & bit != 0;
         held.then_some(high)
@@ -204,18 +247,17 @@ impl Gpio {
         let Modes {
             output,
             open_drain,
-            alternate,
             pulled,
             ..
         } = self.modes;
-        let value = self.odr | alternate;
+        let value = self.value();
         let strong_low = output & !value;
         let strong_high = output & !open_drain & value;
         let Outside { low, high, pull_up } = self.outside;
         self.contention |= strong_high & low | strong_low & high;
         let held_low = strong_low | low;
         let held_high = (strong_high | high) & !held_low;
-        let weak = pull_up | pulled & self.odr;
+        let weak = pull_up | pulled & value;
         let level = held_high | weak & !held_low;
         let changed = level ^ self.level;
         self.level = level;
@@ -250,43 +292,15 @@ impl Gpio {
                 }
             }
         }
-        self.modes = modes;
-    }
-
-    /// Returns the bits of CRL (`first` = 0) or CRH (8) that LCKR has frozen.
-    fn locked(&self, first: u32) -> u32 {
-        if self.lckr & LCKK == 0 {
-            return 0;
-        }
-        (0..8)
-            .filter(|pin| self.lckr >> (first + pin) & 1 != 0)
-            .fold(0, |mask, pin| mask | 0xF << (4 * pin))
-    }
-
-    /// LCKR: write 1, write 0, write 1, then read, each with the same pins (RM0008 9.2.7).
-    fn write_lckr(&mut self, value: u32) {
-        if self.lckr & LCKK != 0 {
-            return;
-        }
-        let (pins, key) = (value & 0xFFFF, value & LCKK != 0);
-        let same = pins == self.lckr & 0xFFFF;
-        self.lock_step = match (self.lock_step, key) {
-            (1, false) if same => 2,
-            (2, true) if same => 3,
-            (_, true) => 1,
-            _ => 0,
+        let DebugPins { owned, up, down } = self.debug;
+        let free = !owned;
+        self.modes = Modes {
+            output: modes.output & free,
+            open_drain: modes.open_drain & free,
+            alternate: modes.alternate & free,
+            analog: modes.analog & free,
+            pulled: modes.pulled & free | up | down,
         };
-        self.lckr = pins;
-    }
-
-    fn read_lckr(&mut self) -> u32 {
-        if core::mem::take(&mut self.lock_step) == 3 {
-            // The first read still shows LCKK as 0.
-            let shown = self.lckr;
-            self.lckr |= LCKK;
-            return shown;
-        }
-        self.lckr
     }
 }
 
@@ -342,7 +356,7 @@ impl Peripheral for Gpio {
         self.odr = 0;
         self.lckr = 0;
         self.lock_step = 0;
-        self.modes = Modes::default();
+        self.decode();
         self.settle(now);
     }
 }

@@ -76,3 +76,37 @@ fn slow_pin_faster_than_2_mhz_is_refused() {
     }
     assert_eq!(port.write(4, 0x4444_4443, NOW), Ok(()), "another pin");
 }
+
+#[test]
+fn debug_port_owns_its_pins_whatever_the_registers_say() {
+    let mut port = Gpio::default();
+    let swj = DebugPins {
+        owned: 0b111 << 13,
+        up: 0b101 << 13,
+        down: 1 << 14,
+    };
+    port.set_debug(swj, NOW);
+    assert_eq!(port.read(8, NOW), Ok(0b101 << 13));
+    // The board's pull-up wins against the weak pull-down of SWCLK.
+    port.drive(14, Drive::PullUp, NOW);
+    assert_eq!(port.read(8, NOW), Ok(0b111 << 13));
+    // Outputs, low.
+    port.write(4, 0x2224_4444, NOW).unwrap();
+    assert_eq!((port.outputs(), port.level()), (0, 0b111 << 13));
+    assert_eq!(port.held(14), Some(false));
+    port.set_debug(DebugPins::default(), NOW);
+    assert_eq!((port.outputs(), port.level()), (0b111 << 13, 0));
+    port.set_debug(swj, NOW);
+    port.reset(NOW);
+    assert_eq!(port.level(), 0b111 << 13);
+}
+
+#[test]
+fn output_of_the_dac_is_at_an_analog_pin_only() {
+    let mut port = Gpio::default();
+    port.set_dac(4, Some(1200));
+    assert_eq!(port.dac(4), None);
+    port.write(0, 0x4440_4444, NOW).unwrap();
+    assert_eq!(port.dac(4), Some(1200));
+    assert_eq!(port.dac(5), None);
+}

@@ -49,5 +49,7 @@ pub mod cr2 {
 /// Control register 3, 27.6.6.
 pub mod cr3 {
     pub const EIE: u32 = 1 << 0;
+    pub const DMAR: u32 = 1 << 6;
+    pub const DMAT: u32 = 1 << 7;
     pub const MASK: u32 = 0x07FF;
 }

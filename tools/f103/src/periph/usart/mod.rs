@@ -1,4 +1,4 @@
-//! A USART in asynchronous mode, without DMA, LIN, smartcard, IrDA or flow control (RM0008 27).
+//! A USART in asynchronous mode, without LIN, smartcard, IrDA or flow control (RM0008 27).
 //!
 //! [`Usart::take_sent`] returns the characters that the USART has sent, and [`Usart::receive_edge`] adds an edge at its
 //! RX pin. [`Usart::exchange`] does both with the [`Wire`] at its pins. All instants are whole cycles of the kernel
@@ -315,9 +315,9 @@ impl Peripheral for Usart {
             }
             offset::CR3 => {
                 self.cr3 = value & cr3::MASK;
-                if value & cr3::MASK & !cr3::EIE != 0 {
+                if value & cr3::MASK & !(cr3::EIE | cr3::DMAR | cr3::DMAT) != 0 {
                     return Err(Unmodelled(
-                        "USART DMA, flow control, half-duplex, smartcard or IrDA (CR3)",
+                        "USART flow control, half-duplex, smartcard or IrDA (CR3)",
                     ));
                 }
             }
@@ -349,8 +349,19 @@ impl Peripheral for Usart {
         self.advance_receiver(now);
     }
 
-    /// See 27.4, table 196. The error interrupt (EIE) needs DMA, which is not modelled.
+    /// See 27.3.13.
+    fn dma_requests(&self) -> [bool; 2] {
+        let on = |enable, flag| self.cr3 & enable != 0 && self.sr & flag != 0;
+        let transmits = self.cr1 & (cr1::UE | cr1::TE) == cr1::UE | cr1::TE;
+        [on(cr3::DMAR, sr::RXNE), transmits && on(cr3::DMAT, sr::TXE)]
+    }
+
+    /// See 27.4, table 196.
     fn irq(&self) -> bool {
+        let error = cr3::EIE | cr3::DMAR;
+        if self.cr3 & error == error && self.sr & (sr::FE | sr::ORE | sr::NE) != 0 {
+            return true;
+        }
         [
             (cr1::TXEIE, sr::TXE),
             (cr1::TCIE, sr::TC),

@@ -253,3 +253,24 @@ fn a_long_run_keeps_few_edges() {
     }
     assert!(usart.rx_pin.len() < 20, "{}", usart.rx_pin.len());
 }
+
+#[test]
+fn received_word_requests_a_transfer_and_an_error_an_interrupt() {
+    let mut usart = receiver(0, 0);
+    usart
+        .write(offset::CR3, cr3::DMAR | cr3::EIE, Time::ZERO)
+        .unwrap();
+    let first = byte(0x55).at(START);
+    play(&mut usart, first);
+    let end = first.end();
+    usart.advance(end);
+    assert_eq!((usart.dma_requests(), usart.irq()), ([true, false], false));
+    assert_eq!(data(&mut usart, end), 0x55);
+    assert_eq!(usart.dma_requests(), [false, false]);
+    play(
+        &mut usart,
+        byte(0).at(end).with_bad_stop(settings(Format::N1)),
+    );
+    usart.advance(end + end);
+    assert!(usart.irq(), "framing error");
+}

@@ -204,13 +204,27 @@ fn interrupts_follow_their_enables() {
 }
 
 #[test]
+fn empty_data_register_requests_a_transfer_while_the_transmitter_is_on() {
+    let mut usart = transmitter(0, 0);
+    assert_eq!(usart.dma_requests(), [false, false]);
+    write(&mut usart, offset::CR3, cr3::DMAT, Time::ZERO);
+    assert_eq!(usart.dma_requests(), [false, true]);
+    // The preamble is in the shift register.
+    write(&mut usart, offset::DR, 0x55, Time::ZERO);
+    assert_eq!(usart.dma_requests(), [false, false]);
+    write(&mut usart, offset::CR1, cr1::UE, Time::ZERO);
+    usart.advance(Time::from_ms(1));
+    assert_eq!(usart.dma_requests(), [false, false]);
+}
+
+#[test]
 fn features_not_modelled_are_reported() {
     let mut usart = transmitter(0, 0);
     for (offset, value) in [
         (offset::CR1, ON | cr1::RWU),
         (offset::CR2, cr2::LINEN),
         (offset::CR2, 1 << 12),
-        (offset::CR3, 1 << 7),
+        (offset::CR3, 1 << 8),
         (offset::GTPR, 1),
         (0x1C, 0),
     ] {

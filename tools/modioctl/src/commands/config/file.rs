@@ -10,9 +10,9 @@ use register_map::codes::{Format, Mode};
 use register_map::configuration::{FORMAT, MODE, module_of};
 use toml::de::{DeTable, DeValue};
 
-use super::{Setting, is_module, of_modules};
+use super::{Setting, of_modules};
 use crate::failure::Failure;
-use crate::names::{Book, Item, Meaning, port_of, slots};
+use crate::names::{Book, Item, Meaning, is_module, port_of, slots};
 use crate::value::{parse, show, takes};
 
 /// Returns the text of a file.

@@ -13,7 +13,7 @@ use super::read;
 use crate::cli::Config;
 use crate::device::{Device, fetch, with_modules};
 use crate::failure::Failure;
-use crate::names::{Book, Item};
+use crate::names::{Book, Item, is_module};
 use crate::output;
 use crate::value::show;
 
@@ -168,11 +168,6 @@ fn runs(changes: &[Setting]) -> Vec<(Vec<&str>, u16, Vec<u16>)> {
         }
     }
     runs
-}
-
-fn is_module(item: &Item) -> bool {
-    let ports = configuration::MODULE..configuration::MODULE + points::PORTS;
-    ports.contains(&item.address)
 }
 
 async fn diff(device: &mut Device, book: &Book, path: Option<&Path>) -> Result<(), Failure> {

@@ -12,6 +12,7 @@ use super::{Reply, Request};
 use crate::app::action::Change;
 use crate::app::faults::Faults;
 use crate::app::state::ModuleName;
+use crate::app::terminals::Applied;
 
 type Body = Map<String, Value>;
 
@@ -125,6 +126,25 @@ pub fn change(request: &Request) -> Result<Change, Reply> {
         "manual" => Change::Manual(boolean(key, value)?),
         "millivolts" => Change::Millivolts(number(key, value, 3300)?),
         _ => return Err(unknown(key, "`energised`, `manual` or `millivolts`")),
+    })
+}
+
+/// Returns what is applied to a terminal.
+pub fn applied(request: &Request) -> Result<Applied, Reply> {
+    let body = body(request)?;
+    let (key, value) = only(&body)?;
+    Ok(match key {
+        "energised" => Applied::Energised(boolean(key, value)?),
+        "millivolts" => Applied::Millivolts(number(key, value, 12_000)?),
+        "microamperes" => Applied::Microamperes(number(key, value, 25_000)?),
+        "permille" => Applied::Permille(number(key, value, 1000)?),
+        "high" => Applied::High(boolean(key, value)?),
+        "present" => Applied::Present(boolean(key, value)?),
+        _ => {
+            let known =
+                "`energised`, `millivolts`, `microamperes`, `permille`, `high` or `present`";
+            return Err(unknown(key, known));
+        }
     })
 }
 

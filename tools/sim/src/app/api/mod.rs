@@ -8,6 +8,7 @@
 
 mod body;
 mod description;
+mod outside;
 
 use std::collections::BTreeMap;
 
@@ -16,8 +17,8 @@ use serde_json::Value;
 use sim::Error;
 use utoipa::ToSchema;
 
-use self::body::{Dip, Plug, Power};
-use super::action::{Action, Change};
+use self::body::{Dip, Power};
+use super::action::Action;
 use super::bench::Bench;
 use super::faults::Faults;
 use super::findings::{self, Findings};
@@ -71,8 +72,11 @@ impl Reply {
 impl From<Error> for Reply {
     fn from(error: Error) -> Self {
         let status = match error {
-            Error::Part(f103::Error::Powered) | Error::Channel | Error::NoRadio => 409,
-            Error::Slot(_) => 404,
+            Error::Part(f103::Error::Powered)
+            | Error::Channel
+            | Error::TerminalKind
+            | Error::NoRadio => 409,
+            Error::Slot(_) | Error::Terminal => 404,
             _ => 400,
         };
         Self::error(status, error.to_string())
@@ -127,31 +131,7 @@ fn of_path(
         "faults" => post_faults(bench, n, request),
         "dip" => post_dip(bench, n, request),
         "power" => post_power(bench, n, request),
-        _ => return of_slot(bench, n, request, path),
-    })
-}
-
-/// Carries out a request for a slot: the one at the port in `path`, or the first one. Returns `None` if there is no
-/// such path.
-fn of_slot(bench: &mut Bench, n: usize, request: &Request, path: &str) -> Option<Outcome> {
-    let (port, rest) = match path.strip_prefix("slots/") {
-        Some(path) => {
-            let (port, rest) = path.split_once('/')?;
-            (Some(port_number(port)?), rest)
-        }
-        None => (None, path),
-    };
-    if rest == "module" {
-        return Some(match port {
-            Some(port) => post_slot_module(bench, n, request, port),
-            None => post_module(bench, n, request, None),
-        });
-    }
-    let channel = rest.strip_prefix("channels/")?;
-    Some(match (port, channel_number(channel)) {
-        (_, None) => Err(Reply::error(404, "channels are numbered 1 to 4")),
-        (Some(port), Some(channel)) => post_slot_channel(bench, n, request, port, channel),
-        (None, Some(channel)) => post_channel(bench, n, request, (None, channel)),
+        _ => return outside::of_path(bench, n, request, path),
     })
 }
 
@@ -261,83 +241,6 @@ fn post_power(bench: &mut Bench, n: usize, request: &Request) -> Outcome {
     }
 }
 
-/// Plug another module into the first slot, while the power is off
-#[utoipa::path(
-    post,
-    path = "/api/module",
-    request_body = inline(Plug),
-    responses((status = 409, description = "The power is on", body = Refusal))
-)]
-fn post_module(bench: &mut Bench, n: usize, request: &Request, port: Option<u8>) -> Outcome {
-    let Plug { name: module } = body::plug(request)?;
-    apply(bench, n, &Action::Module { port, module })
-}
-
-/// Plug another module into this slot, while the power is off
-#[utoipa::path(
-    post,
-    path = "/api/slots/{port}/module",
-    params(("port" = inline(u8), Path, description = "Number of the slot's port", minimum = 1, maximum = 8)),
-    request_body = inline(Plug),
-    responses(
-        (status = 404, description = "The board has no such slot", body = Refusal),
-        (status = 409, description = "The power is on", body = Refusal),
-    )
-)]
-fn post_slot_module(bench: &mut Bench, n: usize, request: &Request, port: u8) -> Outcome {
-    post_module(bench, n, request, Some(port))
-}
-
-/// Change what is connected to a channel
-#[utoipa::path(
-    post,
-    path = "/api/channels/{channel}",
-    params(("channel" = inline(u8), Path, minimum = 1, maximum = 4)),
-    request_body = inline(Change),
-    responses(
-        (status = 404, description = "There is no such channel", body = Refusal),
-        (status = 409, description = "The channel is of another kind", body = Refusal),
-    )
-)]
-fn post_channel(
-    bench: &mut Bench,
-    n: usize,
-    request: &Request,
-    (port, channel): (Option<u8>, usize),
-) -> Outcome {
-    let change = body::change(request)?;
-    let action = Action::Channel {
-        port,
-        channel,
-        change,
-    };
-    apply(bench, n, &action)
-}
-
-/// Change what is connected to a channel
-#[utoipa::path(
-    post,
-    path = "/api/slots/{port}/channels/{channel}",
-    params(
-        ("port" = inline(u8), Path, description = "Number of the slot's port", minimum = 1, maximum = 8),
-        ("channel" = inline(u8), Path, minimum = 1, maximum = 4),
-    ),
-    request_body = inline(Change),
-    responses(
-        (status = 404, description = "There is no such channel", body = Refusal),
-        (status = 409, description = "The channel is of another kind", body = Refusal),
-    )
-)]
-fn post_slot_channel(
-    bench: &mut Bench,
-    n: usize,
-    request: &Request,
-    port: u8,
-    channel: usize,
-) -> Outcome {
-    post_channel(bench, n, request, (Some(port), channel))
-}
-
 /// Applies an action to board `n`, and returns the new state.
 fn apply(bench: &mut Bench, n: usize, action: &Action) -> Outcome {
     bench.apply(n, action)?;
@@ -355,19 +258,6 @@ fn reading(request: &Request) -> Result<(), Reply> {
         "GET" => Ok(()),
         _ => Err(Reply::error(405, "this path accepts GET only")),
     }
-}
-
-fn channel_number(text: &str) -> Option<usize> {
-    ["1", "2", "3", "4"]
-        .iter()
-        .position(|number| *number == text)
-        .map(|position| position + 1)
-}
-
-/// Returns the port in a path. Only the usual form of a number names a port, neither `+1` nor `01`.
-fn port_number(text: &str) -> Option<u8> {
-    let port: u8 = text.parse().ok()?;
-    (port.to_string() == text).then_some(port)
 }
 
 /// Returns the K of `since=K`; 0 without a query, because frames are numbered from 1.

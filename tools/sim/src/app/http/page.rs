@@ -12,7 +12,7 @@ const CSS: &str = "text/css; charset=utf-8";
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 
 /// Path, type and content of each file, except `/modules.js`.
-pub const FILES: [(&str, &str, &str); 14] = [
+pub const FILES: [(&str, &str, &str); 15] = [
     ("/", HTML, include_str!("../page/index.html")),
     ("/page.css", CSS, include_str!("../page/page.css")),
     ("/board.css", CSS, include_str!("../page/board.css")),
@@ -26,6 +26,11 @@ pub const FILES: [(&str, &str, &str); 14] = [
     ("/faults.js", SCRIPT, include_str!("../page/faults.js")),
     ("/frames.js", SCRIPT, include_str!("../page/frames.js")),
     ("/model.js", SCRIPT, include_str!("../page/model.js")),
+    (
+        "/terminals.js",
+        SCRIPT,
+        include_str!("../page/terminals.js"),
+    ),
     ("/ui.js", SCRIPT, include_str!("../page/ui.js")),
 ];
 

@@ -4,6 +4,7 @@ import { pointName, slotsOf, terminals } from "/model.js";
 import { modules } from "/modules.js";
 import { post } from "/api.js";
 import { buildChannel, showChannel } from "/channels.js";
+import * as fixed from "/terminals.js";
 import { byId, element, select, setText } from "/ui.js";
 
 let shown = null;
@@ -21,14 +22,16 @@ export function channels(state) {
 const idOf = (slot, at) => `c${slot}-${at + 1}`;
 const redraw = () => shown && show(shown);
 
-/** The part of a state whose change needs new elements: board type, ports and modules. */
-const shape = (state) => JSON.stringify([state.board, slotsOf(state).map((slot) => [slot.port, slot.module])]);
+/** The part of a state whose change needs new elements: board type, ports and modules, terminals. */
+const shape = (state) => JSON.stringify(
+  [state.board, slotsOf(state).map((slot) => [slot.port, slot.module]), fixed.shape(state)]);
 
 /** Shows a state. */
 export function show(state) {
   const isNew = shown === null || shape(shown) !== shape(state);
   shown = state;
-  if (isNew) byId("slots").replaceChildren(...slotsOf(state).map(buildSlot));
+  if (isNew) byId("slots").replaceChildren(...(state.terminals ? fixed.build(state) : slotsOf(state).map(buildSlot)));
+  byId("switch").hidden = Boolean(state.terminals);
   setText(byId("name"), state.board);
   document.title = `${state.board}, a virtual board`;
   byId("power").setAttribute("aria-checked", String(state.powered));
@@ -42,6 +45,8 @@ export function show(state) {
   for (const name of ["run", "fault", "activity"]) {
     byId(`led-${name}`).classList.toggle("lit", state.leds[name]);
     setText(byId(`led-${name}-text`), state.leds[name] ? "on" : "off");
+    // A board with fixed inputs and outputs has one LED.
+    byId(`led-${name}`).parentElement.hidden = name !== "run" && Boolean(state.terminals);
   }
   setText(byId("line-rate"), `${state.line.baud} bit/s`);
   setText(byId("line-format"), state.line.format);
@@ -49,6 +54,7 @@ export function show(state) {
   setText(byId("line-requests"), String(state.line.rx_frames));
   setText(byId("line-replies"), String(state.line.tx_frames));
   slotsOf(state).forEach((slot, n) => showSlot(slot, n, state.powered));
+  fixed.show(state);
   byId("radio").hidden = !state.radio;
   if (state.radio) showRadio(state.radio);
   const log = byId("log");

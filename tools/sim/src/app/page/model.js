@@ -63,8 +63,9 @@ export const terminals = (module) => LABELS[module] ?? ["1", "2", "3", "4", "COM
 /** Port of the only slot of a modio-02. The state of a board with one slot does not name the port. */
 const ONLY_PORT = 5;
 
-/** Returns the slots of a board, each with the first part of its paths. */
+/** Returns the slots of a board, each with the first part of its paths. A board with terminals has none. */
 export function slotsOf(state) {
+  if (state.terminals) return [];
   if (!state.slots) {
     const { module, configured, channels } = state;
     return [{ port: ONLY_PORT, path: "", module, configured, channels }];

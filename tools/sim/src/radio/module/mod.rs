@@ -8,7 +8,7 @@ use super::packet::{News, Packet, Sender};
 use super::parameters::{Mode, Parameters, SLEEP_UART};
 use super::sending::Sending;
 use super::timing;
-use super::uart::Uart;
+use crate::uart::Uart;
 use f103::corner::Corner;
 use f103::periph::gpio::Drive;
 use f103::time::Time;

@@ -173,3 +173,48 @@ fn announced_endpoints_are_listed_by_name() {
     let listed = get(&mut bench, "/api/endpoints").body;
     assert_eq!(listed, json!({ "tcp": "127.0.0.1:5020" }));
 }
+
+#[test]
+fn terminals_of_the_fx3u_are_addressed_by_their_names() {
+    let mut bench = bench_of(Config {
+        layout: &board::FX3U_24,
+        ..Config::default()
+    });
+    let first = state(&mut bench);
+    assert_eq!(first.get("slots"), None);
+    assert_eq!(
+        (&first["module"], &first["address"]),
+        (&json!("none"), &json!(null))
+    );
+    let terminals = first["terminals"].as_array().expect("a list");
+    assert_eq!(terminals.len(), 36);
+    assert_eq!(
+        terminals[0],
+        json!({"name": "X0", "kind": "input", "energised": false})
+    );
+    for (at, path, body) in [
+        (0, "X0", json!({"energised": true})),
+        (24, "AD0", json!({"millivolts": 10_000})),
+        (27, "AD3", json!({"microamperes": 4000})),
+        (30, "POT0", json!({"permille": 1000})),
+        (34, "RUN", json!({"high": true})),
+        (35, "24V", json!({"present": false})),
+    ] {
+        let path = format!("/api/terminals/{path}");
+        let reply = post(&mut bench, &path, &body.to_string());
+        assert_eq!(reply.status, 200, "{path}");
+        let (key, value) = body.as_object().unwrap().iter().next().unwrap();
+        assert_eq!(reply.body["terminals"][at][key], *value, "{path}");
+    }
+    for (path, body, status) in [
+        ("/api/terminals/X8", r#"{"energised":true}"#, 404),
+        ("/api/terminals/X0", r#"{"millivolts":1}"#, 409),
+        ("/api/terminals/Y0", r#"{"energised":true}"#, 409),
+        ("/api/terminals/AD0", r#"{"millivolts":12001}"#, 400),
+        ("/api/terminals/X0", r#"{"on":true}"#, 400),
+        ("/api/channels/1", r#"{"energised":true}"#, 404),
+        ("/api/module", r#"{"name":"4do"}"#, 409),
+    ] {
+        assert_eq!(post(&mut bench, path, body).status, status, "{path} {body}");
+    }
+}

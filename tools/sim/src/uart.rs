@@ -1,13 +1,13 @@
-//! The UART of a module: samples the level at RXD, and sends characters at TXD.
+//! A UART that is connected to one of the part: samples the level at RXD, and sends characters at TXD.
 
 use std::collections::VecDeque;
 
-use super::parameters::SLEEP_UART;
+use crate::radio::SLEEP_UART;
 use f103::periph::usart::{Sent, TxPin};
 use f103::serial::{Character, Framing, Receiver, Settings, Wave, Word};
 use f103::time::Time;
 
-/// A byte that a module has sent at TXD.
+/// A byte that was sent at TXD.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Byte {
     /// The byte.
@@ -18,7 +18,7 @@ pub struct Byte {
     pub end: Time,
 }
 
-/// The UART of a module.
+/// The UART.
 #[derive(Clone, Debug)]
 pub(crate) struct Uart {
     settings: Settings,
@@ -59,13 +59,13 @@ impl Default for Uart {
 
 impl Uart {
     /// Returns the duration of `n` bytes.
-    pub(super) fn bytes(&self, n: u64) -> Time {
+    pub(crate) fn bytes(&self, n: u64) -> Time {
         self.settings.characters(n)
     }
 
     /// Switches the receiver on or off, with this rate and format. A character that is being received is lost if one of
     /// them changes.
-    pub(super) fn set(&mut self, settings: Settings, open: bool, now: Time) {
+    pub(crate) fn set(&mut self, settings: Settings, open: bool, now: Time) {
         if (settings, open) != (self.settings, self.open) {
             self.settings = settings;
             self.open = open;
@@ -100,7 +100,7 @@ impl Uart {
     }
 
     /// Returns the next word that was received by `now`, without its parity bit.
-    pub(super) fn next_word(&mut self, now: Time) -> Option<Word> {
+    pub(crate) fn next_word(&mut self, now: Time) -> Option<Word> {
         if !self.open {
             return None;
         }
@@ -113,12 +113,12 @@ impl Uart {
     }
 
     /// Returns whether no character is being received.
-    pub(super) fn is_idle(&self) -> bool {
+    pub(crate) fn is_idle(&self) -> bool {
         self.receiver.is_idle()
     }
 
     /// Returns the instant at which a character begins or is complete.
-    pub(super) fn next_event(&self) -> Option<Time> {
+    pub(crate) fn next_event(&self) -> Option<Time> {
         if !self.open {
             return None;
         }
@@ -128,7 +128,7 @@ impl Uart {
     }
 
     /// Sends bytes at TXD from `at` on, or after those that are still to be sent.
-    pub(super) fn send(&mut self, at: Time, bytes: impl IntoIterator<Item = u8>) {
+    pub(crate) fn send(&mut self, at: Time, bytes: impl IntoIterator<Item = u8>) {
         let first = at.max(self.sent_until);
         for (byte, n) in bytes.into_iter().zip(0..) {
             let (start, end) = (first + self.bytes(n), first + self.bytes(n + 1));
@@ -140,18 +140,18 @@ impl Uart {
     }
 
     /// Returns the end of the last byte at TXD.
-    pub(super) const fn sent_until(&self) -> Time {
+    pub(crate) const fn sent_until(&self) -> Time {
         self.sent_until
     }
 
     /// Returns the number of bytes at TXD that do not begin before `now`.
-    pub(super) fn waiting(&self, now: Time) -> usize {
+    pub(crate) fn waiting(&self, now: Time) -> usize {
         let waiting = self.sent.iter().rev();
         waiting.take_while(|byte| byte.start >= now).count()
     }
 
     /// Ends all sending from `now` on: TXD goes high.
-    pub(super) fn cut(&mut self, now: Time) {
+    pub(crate) fn cut(&mut self, now: Time) {
         self.txd.truncate(now);
         self.txd.push(now, true);
         while self.sent.back().is_some_and(|byte| byte.end > now) {
@@ -161,7 +161,7 @@ impl Uart {
     }
 
     /// Removes and returns the bytes at TXD that have ended by `now`.
-    pub(super) fn take_sent(&mut self, now: Time) -> Vec<Byte> {
+    pub(crate) fn take_sent(&mut self, now: Time) -> Vec<Byte> {
         let count = self.sent.partition_point(|byte| byte.end <= now);
         self.sent.drain(..count).collect()
     }
@@ -184,7 +184,7 @@ impl Uart {
     }
 
     /// Drops what is not needed after `now`.
-    pub(super) fn forget(&mut self, now: Time) {
+    pub(crate) fn forget(&mut self, now: Time) {
         if [&self.host, &self.rxd, &self.txd]
             .iter()
             .all(|wave| wave.is_empty())
