@@ -6,7 +6,7 @@
 use stm32f1xx_hal::pac;
 
 use crate::{
-    boards::SLOTS,
+    boards::{BOARD, SLOTS},
     design::{ADC_CALIBRATION_US, ADC_POLLS, ADC_SAMPLE_HALF_CYCLES, ADC_SETTLING_US},
     fitted::{self, Fitted},
     wait::{delay_us, within_us},
@@ -38,11 +38,11 @@ impl Sampler {
     }
 
     /// Samples every line once: 5.7 us each, 6.8 us without a crystal. Returns the codes by slot: 0 for ground to 4095
-    /// for 3.3 V. If a conversion has not ended after [`ADC_POLLS`] polls, this call stops there and skips the
+    /// for 3.3 V, or for the full range of a fixed input. If a conversion has not ended after [`ADC_POLLS`] polls, this call stops there and skips the
     /// remaining lines.
     pub fn run(&mut self) -> [[Option<u16>; 4]; SLOTS] {
         let mut codes = [[None; 4]; SLOTS];
-        if fitted::Slots::proof().is_none() {
+        if fitted::Analog::proof().is_none() {
             return codes;
         }
         let inputs = self.inputs.as_flattened().iter();
@@ -56,6 +56,13 @@ impl Sampler {
                         self.power_up();
                     }
                     break;
+                }
+            }
+        }
+        if !BOARD.has_slots() {
+            for (slot, codes) in BOARD.slots.iter().zip(&mut codes) {
+                for (line, code) in codes.iter_mut().enumerate() {
+                    *code = code.map(|code| slot.kind.from_converter(line, code));
                 }
             }
         }

@@ -6,8 +6,8 @@ use cortex_m::peripheral::SCB;
 use stm32f1xx_hal::{pac, rcc::Enable};
 
 use crate::{
-    ClockSource, CrcUnit, DacBus, Flash, IoPin, Rs485, Rs485Timer, SLOT, Sampler, ScanTimer,
-    Watchdog,
+    ClockSource, CrcUnit, DacBus, Flash, IoPin, OwnDac, Rs485, Rs485Timer, SLOT, Sampler,
+    ScanTimer, Watchdog,
     boards::{AddressPins, BOARD, LEDS},
     clock,
     design::{CRYSTAL_FAULTS, DIP_POLL_US, DIP_SETTLE_CYCLES},
@@ -55,6 +55,8 @@ pub struct Board {
     pub sampler: Sampler,
     /// The bus to the DACs of the analog-output modules. Its pins float until the first transfer.
     pub dacs: DacBus,
+    /// The part's own DAC, if the board uses it.
+    pub own_dac: Option<OwnDac>,
     /// The flash pages that keep data without power.
     pub flash: Flash,
     /// The unit that computes the CRC-32 of an image.
@@ -185,6 +187,7 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
         unique_id: unique_id::read(),
         sampler: Sampler::new(device.ADC1),
         dacs: DacBus::new(device.I2C1, clock),
+        own_dac: OwnDac::new(device.DAC, &mut rcc),
         flash: Flash::new(device.FLASH, device.PWR, masked),
         crc: CrcUnit::new(device.CRC, &mut rcc),
         leds,

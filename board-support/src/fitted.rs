@@ -8,6 +8,10 @@ use crate::boards::BOARD;
 /// A condition that is known at compile time.
 pub struct If<const YES: bool>;
 
+/// The proof of something that the board has.
+#[derive(Clone, Copy, Debug)]
+pub struct Yes;
+
 /// Something that a board has or does not have.
 pub trait Fitted {
     /// A type with one value if the board has it, and without values if not.
@@ -18,11 +22,11 @@ pub trait Fitted {
 }
 
 impl Fitted for If<true> {
-    type Proof = ();
+    type Proof = Yes;
 
     #[inline(always)]
-    fn proof() -> Option<()> {
-        Some(())
+    fn proof() -> Option<Yes> {
+        Some(Yes)
     }
 }
 
@@ -39,3 +43,7 @@ impl Fitted for If<false> {
 pub type Radio = If<{ BOARD.radio.is_some() }>;
 /// Slots for modules.
 pub type Slots = If<{ BOARD.has_slots() }>;
+/// Analog inputs or outputs.
+pub type Analog = If<{ BOARD.has_analog() }>;
+/// The part's own DAC.
+pub type OwnDac = If<{ BOARD.has_own_dac() }>;

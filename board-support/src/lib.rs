@@ -10,6 +10,7 @@
 pub mod boards;
 pub mod design;
 pub mod fault;
+mod full_scale;
 pub mod gap;
 pub mod gesture;
 #[cfg(any(target_os = "none", test))]
@@ -48,6 +49,8 @@ pub mod loading;
 #[cfg(target_os = "none")]
 mod mem;
 #[cfg(target_os = "none")]
+mod own_dac;
+#[cfg(target_os = "none")]
 mod pin_io;
 #[cfg(target_os = "none")]
 mod radio;
@@ -81,6 +84,7 @@ pub use {
     flash::{Flash, FlashError},
     gap_timer::Rs485Timer,
     i2c::DacBus,
+    own_dac::OwnDac,
     pin_io::IoPin,
     radio::{Damaged, Proof as RadioProof, RadioUart},
     registers::{Part, Registers, Wrong},

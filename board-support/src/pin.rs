@@ -129,6 +129,16 @@ impl Pin {
         0xF << (self.number % 8 * 4)
     }
 
+    /// Returns the number of the DAC's output on this pin, if there is one (DS5792 table 5).
+    #[must_use]
+    pub const fn dac_output(self) -> Option<u8> {
+        match (self.port, self.number) {
+            (Port::A, 4) => Some(0),
+            (Port::A, 5) => Some(1),
+            _ => None,
+        }
+    }
+
     /// Returns the number of the ADC1 input on this pin, if there is one (DS5319 table 5, DS5792 table 5).
     #[must_use]
     pub const fn adc_input(self) -> Option<u8> {

@@ -3,7 +3,7 @@
 
 use core::array;
 
-use crate::{IoPin, boards::SlotPins, pin::Mode};
+use crate::{IoPin, boards::SlotPins, pin::Mode, pin_io::LACKS};
 
 /// Call one of these once, in `init`, before the first interrupt.
 impl SlotPins {
@@ -27,7 +27,9 @@ impl SlotPins {
     pub fn analog(&self, count: usize) -> [Option<u8>; 4] {
         let mut inputs = [None; 4];
         for (line, input) in self.lines.iter().zip(&mut inputs).take(count) {
-            line.configure(Mode::Analog);
+            if !LACKS || !line.is_none() {
+                line.configure(Mode::Analog);
+            }
             *input = line.adc_input();
         }
         inputs

@@ -220,7 +220,7 @@ pub const ETH_IO5R: Board = ROWS[4].board();
 
 impl Board {
     /// All boards, in the order of their codes.
-    pub const ALL: [&'static Self; 3] = [&MODIO_02, &MODIO_08, &ETH_IO5R];
+    pub const ALL: [&'static Self; 5] = [&MODIO_02, &MODIO_08, &FX3U_14, &FX3U_24, &ETH_IO5R];
 
     /// Every code of register BOARD with the board's name.
     pub const NAMES: [(u16, &'static str); Self::ALL.len()] = {
@@ -398,7 +398,7 @@ mod tests {
         let error = "nucleo".parse::<&Board>().unwrap_err();
         assert_eq!(
             error.to_string(),
-            "not a board; one of modio-02, modio-08, eth-io5r"
+            "not a board; one of modio-02, modio-08, fx3u-14, fx3u-24, eth-io5r"
         );
     }
 

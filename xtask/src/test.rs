@@ -432,10 +432,7 @@ mod tests {
     #[test]
     fn steps_are_chosen_by_command_or_name() {
         let host = names(&[], Host).unwrap();
-        assert_eq!(
-            host[..4],
-            ["unit", "image-02", "image-08", "image-eth-io5r"]
-        );
+        assert_eq!(host[..4], ["unit", "image-02", "image-08", "image-fx3u-14"]);
         let test = names(&[], Test).unwrap();
         assert!(host.iter().all(|name| test.contains(name)) && !test.contains(&"fuzz".to_owned()));
         assert_eq!(

@@ -5,6 +5,9 @@
 //! the radio's UART on PB10 and PB11, and the DACs' bus on PB6 and PB7.
 
 pub mod eth_io5r;
+mod fx3u;
+pub mod fx3u_14;
+pub mod fx3u_24;
 pub mod modio_02;
 pub mod modio_08;
 
@@ -77,7 +80,27 @@ pub enum PortKind {
     Inputs,
     /// Digital outputs, which a high line turns on, as in a 4DO.
     Outputs,
+    /// Analog inputs, as in a 4AI.
+    AnalogInputs(&'static FullScale),
+    /// Analog outputs by the part's own DAC, as in a 4AO.
+    AnalogOutputs(&'static FullScale),
+    /// Analog inputs, as in a 4AI; or, as in a 2AI2AO, the first two of them and outputs by the part's own DAC.
+    Analog(&'static Analog),
 }
+
+/// The converters of a port of kind [`PortKind::Analog`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Analog {
+    /// Codes of the inputs.
+    pub inputs: FullScale,
+    /// The pins of channels 3 and 4 as outputs.
+    pub outputs: [Pin; 2],
+    /// Codes of the outputs, which are the last two of these.
+    pub output: FullScale,
+}
+
+/// Codes of the converter at 10 V or 20 mA, for each channel.
+pub type FullScale = [u16; 4];
 
 /// The pins of the LoRa radio.
 #[derive(Clone, Copy, Debug)]
@@ -145,6 +168,35 @@ impl Descriptor {
         false
     }
 
+    /// Returns whether there are analog inputs or outputs, or slots for them.
+    #[must_use]
+    pub const fn has_analog(&self) -> bool {
+        let mut slot = 0;
+        while slot < self.slots.len() {
+            if !matches!(self.slots[slot].kind, PortKind::Inputs | PortKind::Outputs) {
+                return true;
+            }
+            slot += 1;
+        }
+        false
+    }
+
+    /// Returns whether the part's own DAC is used.
+    #[must_use]
+    pub const fn has_own_dac(&self) -> bool {
+        let mut slot = 0;
+        while slot < self.slots.len() {
+            if matches!(
+                self.slots[slot].kind,
+                PortKind::AnalogOutputs(_) | PortKind::Analog(_)
+            ) {
+                return true;
+            }
+            slot += 1;
+        }
+        false
+    }
+
     /// Checks the descriptor at compile time.
     const fn check(&self) {
         assert!(self.slots.len() <= 8, "a board has at most 8 ports");
@@ -155,11 +207,23 @@ impl Descriptor {
         let mut slot = 0;
         while slot < self.slots.len() {
             let SlotPins { lines, kind } = self.slots[slot];
+            assert!(
+                matches!(kind, PortKind::Slot { .. }) == self.has_slots(),
+                "a board has slots or fixed ports, not both"
+            );
             let mut line = 0;
             while line < 4 {
+                let pin = lines[line];
                 assert!(
-                    !matches!(kind, PortKind::Slot { .. }) || lines[line].adc_input().is_some(),
-                    "every line of a slot must be an ADC input"
+                    match kind {
+                        PortKind::Slot { .. } | PortKind::Analog(_) => {
+                            pin.adc_input().is_some()
+                        }
+                        PortKind::AnalogInputs(_) => pin.is_none() || pin.adc_input().is_some(),
+                        PortKind::AnalogOutputs(_) => pin.is_none() || pin.dac_output().is_some(),
+                        PortKind::Inputs | PortKind::Outputs => true,
+                    },
+                    "every analog line must be an input or output of a converter"
                 );
                 line += 1;
             }
@@ -169,6 +233,8 @@ impl Descriptor {
 }
 
 const _: () = eth_io5r::BOARD.check();
+const _: () = fx3u_14::BOARD.check();
+const _: () = fx3u_24::BOARD.check();
 const _: () = modio_02::BOARD.check();
 const _: () = modio_08::BOARD.check();
 
@@ -176,9 +242,21 @@ const _: () = modio_08::BOARD.check();
 // feature are those of the modio-02.
 #[cfg(feature = "eth-io5r")]
 pub use eth_io5r::BOARD;
+#[cfg(feature = "fx3u-14")]
+pub use fx3u_14::BOARD;
+#[cfg(feature = "fx3u-24")]
+pub use fx3u_24::BOARD;
 #[cfg(any(
     feature = "modio-02",
-    all(test, not(any(feature = "modio-08", feature = "eth-io5r")))
+    all(
+        test,
+        not(any(
+            feature = "modio-08",
+            feature = "eth-io5r",
+            feature = "fx3u-14",
+            feature = "fx3u-24"
+        ))
+    )
 ))]
 pub use modio_02::BOARD;
 #[cfg(feature = "modio-08")]

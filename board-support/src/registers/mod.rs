@@ -277,6 +277,8 @@ mod tests {
         );
         memory.0.insert(PORT_A, 0x3333_3338);
         memory.0.insert(APB1ENR, 0x5555_5555);
+        let mapr = memory.0[&MAPR] & 0x7FFF | BOARD.mapr;
+        memory.0.insert(MAPR, mapr);
         memory
     }
 

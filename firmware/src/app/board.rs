@@ -1,8 +1,8 @@
 //! The board of this image, as it appears in the register map and the self-description.
 
-use board_support::boards;
+use board_support::boards::{self, AddressPins, PortKind, SlotPins};
 use firmware::device::Fixed;
-use register_map::{Board, layout::Layout};
+use register_map::{Board, FixedPort, Module, layout::Layout};
 
 /// The board's row in the register map, found by name.
 pub const BOARD: &Board = match Board::named(boards::BOARD.name) {
@@ -23,4 +23,29 @@ pub type Device = firmware::device::Device<{ boards::SLOTS }>;
 pub type Settings = firmware::config::Settings<{ boards::SLOTS }>;
 
 // The register map and the pin descriptor mean the same board.
-const _: () = assert!(BOARD.slots as usize == boards::SLOTS);
+const _: () = {
+    assert!(BOARD.slots as usize == boards::SLOTS);
+    assert!(BOARD.switch == matches!(boards::BOARD.address, AddressPins::Switch(_)));
+    assert!(BOARD.radio == boards::BOARD.radio.is_some());
+    assert!(BOARD.fixed.is_empty() == boards::BOARD.has_slots());
+    let mut port = 0;
+    while port < BOARD.fixed.len() {
+        let SlotPins { lines, kind } = boards::BOARD.slots[port];
+        let FixedPort {
+            module, channels, ..
+        } = BOARD.fixed[port];
+        assert!(matches!(
+            (kind, module),
+            (PortKind::Inputs, Module::Di4)
+                | (PortKind::Outputs, Module::Do4)
+                | (PortKind::AnalogInputs(_) | PortKind::Analog(_), Module::Ai4)
+                | (PortKind::AnalogOutputs(_), Module::Ao4)
+        ));
+        let mut line = 0;
+        while line < lines.len() {
+            assert!(lines[line].is_none() == (line >= channels as usize));
+            line += 1;
+        }
+        port += 1;
+    }
+};

@@ -85,7 +85,7 @@ pub fn up(
     let loaded = store.load(BOARD, &pages);
     let number = if board.as_255 {
         RECOVERY_UNIT
-    } else if BOARD.switch {
+    } else if BOARD.switch || board.dip == RECOVERY_UNIT {
         board.dip
     } else {
         loaded.settings.get(UNIT) as u8
@@ -105,7 +105,7 @@ pub fn up(
     let on_wire = wire_settings(settings);
 
     let mut sampler = board.sampler;
-    let (modules, analog_outputs) = install(installed, &mut sampler, board.dacs);
+    let (modules, analog_outputs) = install(installed, &mut sampler, board.dacs, board.own_dac);
     let serial_number = if HAS_EVENTS {
         start_up::serial_number(board.unique_id, config.serial_low())
     } else {

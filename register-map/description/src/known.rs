@@ -2,7 +2,7 @@
 
 use register_map::points::{self, Kind};
 use register_map::state::MAP_VERSION_VALUE;
-use register_map::{Access, Board, InForce, Module, Rule, Text, configuration};
+use register_map::{Access, Board, InForce, Module, Rule, Text, configuration, state};
 
 use crate::{
     Description, Field, ModuleType, Narrower, PointKind, Port, Reading, Register, Scope, Table,
@@ -53,7 +53,11 @@ fn register(board: &Board, rule: &Rule, text: &Text) -> Register {
             register_map::Scope::Port => Scope::Port,
             register_map::Scope::Point => Scope::Point,
         },
-        value: value(text.value),
+        value: match rule.first {
+            // Names of other boards would only take room in flash.
+            state::BOARD => Value::Codes(vec![(board.code, board.name.to_owned())]),
+            _ => value(text.value),
+        },
         writable: match rule.first {
             configuration::MODULE => board.ports().any(|port| board.chooses(port)),
             configuration::RANGE => board.fixed.is_empty(),
