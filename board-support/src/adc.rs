@@ -8,6 +8,7 @@ use stm32f1xx_hal::pac;
 use crate::{
     boards::SLOTS,
     design::{ADC_CALIBRATION_US, ADC_POLLS, ADC_SAMPLE_HALF_CYCLES, ADC_SETTLING_US},
+    fitted::{self, Fitted},
     wait::{delay_us, within_us},
 };
 
@@ -41,6 +42,9 @@ impl Sampler {
     /// remaining lines.
     pub fn run(&mut self) -> [[Option<u16>; 4]; SLOTS] {
         let mut codes = [[None; 4]; SLOTS];
+        if fitted::Slots::proof().is_none() {
+            return codes;
+        }
         let inputs = self.inputs.as_flattened().iter();
         for (input, code) in inputs.zip(codes.as_flattened_mut()) {
             if let Some(input) = *input {

@@ -167,7 +167,7 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
     // It connects TIM1 to PA10 in its reset mapping, and ports to external interrupts.
     early::write_mapr(&mut rcc, &device.AFIO);
     pac::ADC1::enable(&mut rcc);
-    if BOARD.has_dacs() {
+    if BOARD.has_slots() {
         pac::I2C1::enable(&mut rcc);
     }
     pac::PWR::enable(&mut rcc);

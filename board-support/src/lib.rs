@@ -38,6 +38,8 @@ mod early;
 #[cfg(target_os = "none")]
 mod edge;
 #[cfg(target_os = "none")]
+pub mod fitted;
+#[cfg(target_os = "none")]
 pub mod flash;
 #[cfg(target_os = "none")]
 mod gap_timer;
@@ -80,7 +82,7 @@ pub use {
     gap_timer::Rs485Timer,
     i2c::DacBus,
     pin_io::IoPin,
-    radio::{Damaged, RadioUart},
+    radio::{Damaged, Proof as RadioProof, RadioUart},
     registers::{Part, Registers, Wrong},
     rs485::{Rs485, disable_driver},
     safe::outputs_off,

@@ -48,7 +48,7 @@ pub struct Pin {
 }
 
 impl Pin {
-    /// No pin: a channel that a port lacks.
+    /// No pin, for a channel that a port does not have.
     pub const NONE: Self = Self {
         port: Port::A,
         number: 16,

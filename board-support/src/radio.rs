@@ -11,6 +11,7 @@ use stm32f1xx_hal::{
 use crate::{
     ClockSource, IoPin,
     boards::BOARD,
+    fitted::{self, Fitted},
     pin::{Mode, Pin},
     uart::divider,
 };
@@ -36,7 +37,11 @@ pub struct RadioOff {
 pub struct RadioUart {
     usart: pac::USART3,
     divider: u16,
+    _fitted: Proof,
 }
+
+/// Proof that the board has a radio.
+pub type Proof = <fitted::Radio as Fitted>::Proof;
 
 /// A byte from the radio, or a damaged or lost one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,17 +49,18 @@ pub struct Damaged;
 
 impl RadioOff {
     /// Sets up the UART and the pins: M0 and M1, which are high as the module pulls them, so that it is asleep until it
-    /// has its settings, and AUX, which is pulled up.
+    /// has its settings, and AUX, which is pulled up. Returns also the proof that the board has a radio.
     /// Returns `None` when the board has no radio, or the clock cannot produce the baud rate; the radio then stays off.
     #[must_use]
-    pub fn start(self, rcc: &mut pac::RCC) -> Option<(RadioUart, [IoPin; 2], IoPin)> {
-        let pins = BOARD.radio?;
+    pub fn start(self, rcc: &mut pac::RCC) -> Option<(RadioUart, [IoPin; 2], IoPin, Proof)> {
+        let (pins, proof) = (BOARD.radio?, fitted::Radio::proof()?);
         let divider = divider(self.clock.apb1_hz(), BAUD)?;
         pac::USART3::enable(rcc);
         pac::USART3::reset(rcc);
         let mut uart = RadioUart {
             usart: self.usart,
             divider,
+            _fitted: proof,
         };
         uart.set_up();
         // The transmitter is on and drives high before the pin becomes its output.
@@ -62,7 +68,7 @@ impl RadioOff {
         Pin::b(11).pull_up();
         let [m0, m1] = pins.mode;
         let mode = [IoPin::high(m0), IoPin::high(m1)];
-        Some((uart, mode, IoPin::pulled_up(pins.aux)))
+        Some((uart, mode, IoPin::pulled_up(pins.aux), proof))
     }
 }
 

@@ -80,6 +80,11 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         }
     }
 
+    /// Sets the unit addresses, which have changed.
+    pub fn set_units(&mut self, units: Units) {
+        self.port.set_units(units);
+    }
+
     /// Handles the UART's interrupt. `now_ms` returns the milliseconds since the start. Returns true when a reply has just
     /// been sent, or a request waits to be served.
     #[inline]

@@ -220,7 +220,7 @@ pub const ETH_IO5R: Board = ROWS[4].board();
 
 impl Board {
     /// All boards, in the order of their codes.
-    pub const ALL: [&'static Self; 2] = [&MODIO_02, &MODIO_08];
+    pub const ALL: [&'static Self; 3] = [&MODIO_02, &MODIO_08, &ETH_IO5R];
 
     /// Every code of register BOARD with the board's name.
     pub const NAMES: [(u16, &'static str); Self::ALL.len()] = {
@@ -396,7 +396,10 @@ mod tests {
         }
         assert_eq!(Board::from_code(0), None);
         let error = "nucleo".parse::<&Board>().unwrap_err();
-        assert_eq!(error.to_string(), "not a board; one of modio-02, modio-08");
+        assert_eq!(
+            error.to_string(),
+            "not a board; one of modio-02, modio-08, eth-io5r"
+        );
     }
 
     #[test]

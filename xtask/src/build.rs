@@ -22,7 +22,7 @@ pub const PROFILE: &str = "firmware";
 #[derive(clap::Args, Clone, Debug)]
 #[group(skip)]
 pub struct Options {
-    /// The board: modio-02 or modio-08
+    /// The board: modio-02, modio-08 or eth-io5r
     #[arg(long, value_name = "NAME", default_value_t = &MODIO_02)]
     pub board: &'static Board,
 }

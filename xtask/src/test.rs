@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 use std::thread;
 
 use In::{Ci, Host, Test};
-use Run::{Each, Once};
+use Run::{Each, EachOfModio, Once};
 use anyhow::{Result, bail, ensure};
 use register_map::Board;
 use register_map::board::{MODIO_02, MODIO_08};
@@ -55,10 +55,15 @@ enum In {
 enum Run {
     Once(fn(&mut Workspace) -> Result<()>),
     Each(fn(&mut Workspace, &'static Board) -> Result<()>),
+    /// For each of [`MODIO`].
+    EachOfModio(fn(&mut Workspace, &'static Board) -> Result<()>),
 }
 
+/// The boards that Renode and the bench have.
+pub const MODIO: [&Board; 2] = [&MODIO_02, &MODIO_08];
+
 /// The steps in the order in which they run: command, name, description, function. The names do not change. A step that
-/// runs for each board has the board's number at the end of its name, such as `lint-02`.
+/// runs for each board has the board's number or name at the end of its name, such as `lint-02` or `lint-eth-io5r`.
 const STEPS: [(In, &str, &str, Run); 22] = [
     (Ci, "fmt", "formatting", Once(formatting)),
     (Ci, "lint-host", "lints, host", Once(lint_host)),
@@ -75,10 +80,20 @@ const STEPS: [(In, &str, &str, Run); 22] = [
     (Test, "modioctl", "modioctl on the simulator", Once(tool)),
     (Test, "pymodbus", "pymodbus and mbpoll", Once(masters)),
     (Test, "page", "the simulator's page", Once(page)),
-    (Test, "renode", "files for Renode", Each(checks::files)),
+    (
+        Test,
+        "renode",
+        "files for Renode",
+        EachOfModio(checks::files),
+    ),
     (Ci, "sim-slow", "sim, slow corner", Once(sim_slow)),
     (Ci, "sim-fast", "sim, fast corner", Once(sim_fast)),
-    (Ci, "bench", "instructions and bytes", Each(bench::check)),
+    (
+        Ci,
+        "bench",
+        "instructions and bytes",
+        EachOfModio(bench::check),
+    ),
     (Ci, "peers", "Modbus servers, briefly", Once(peers::check)),
     (
         Ci,
@@ -124,15 +139,18 @@ type Function = dyn Fn(&mut Workspace) -> Result<()>;
 fn all() -> Vec<Step> {
     let mut all: Vec<Step> = Vec::new();
     for (part_of, name, what, run) in STEPS {
-        match run {
-            Once(run) => all.push((part_of, name.to_owned(), what.to_owned(), Box::new(run))),
-            Each(run) => {
-                for board in Board::ALL {
-                    let name = name.to_owned() + board.name.trim_start_matches("modio");
-                    let run = Box::new(move |workspace: &mut Workspace| run(workspace, board));
-                    all.push((part_of, name, format!("{what}, {board}"), run));
-                }
+        let (run, boards): (_, &[&'static Board]) = match run {
+            Once(run) => {
+                all.push((part_of, name.to_owned(), what.to_owned(), Box::new(run)));
+                continue;
             }
+            Each(run) => (run, &Board::ALL),
+            EachOfModio(run) => (run, &MODIO),
+        };
+        for board in boards {
+            let name = format!("{name}-{}", board.name.trim_start_matches("modio-"));
+            let run = Box::new(move |workspace: &mut Workspace| run(workspace, board));
+            all.push((part_of, name, format!("{what}, {board}"), run));
         }
     }
     all
@@ -414,7 +432,10 @@ mod tests {
     #[test]
     fn steps_are_chosen_by_command_or_name() {
         let host = names(&[], Host).unwrap();
-        assert_eq!(host, ["unit", "image-02", "image-08", "size-02", "size-08"]);
+        assert_eq!(
+            host[..4],
+            ["unit", "image-02", "image-08", "image-eth-io5r"]
+        );
         let test = names(&[], Test).unwrap();
         assert!(host.iter().all(|name| test.contains(name)) && !test.contains(&"fuzz".to_owned()));
         assert_eq!(

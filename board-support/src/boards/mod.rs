@@ -4,6 +4,7 @@
 //! A cargo feature with the board's name selects the board. [`board`](crate::board) holds what all boards share:
 //! the radio's UART on PB10 and PB11, and the DACs' bus on PB6 and PB7.
 
+pub mod eth_io5r;
 pub mod modio_02;
 pub mod modio_08;
 
@@ -58,16 +59,24 @@ pub struct LinePins {
 /// The pins of a port: of a slot, or of fixed inputs or outputs.
 #[derive(Clone, Copy, Debug)]
 pub struct SlotPins {
-    /// Lines 1 to 4. In a slot each is also an input of ADC1. A fixed port may lack some, [`Pin::NONE`].
+    /// Lines 1 to 4. In a slot each is also an input of ADC1. Another port can have fewer: the others are [`Pin::NONE`].
     pub lines: [Pin; 4],
-    /// I2C address of an analog-output module's DAC in this slot, 0x60 to 0x67. Each slot has a different address.
-    /// [`FIXED`](Self::FIXED) on a port without slot.
-    pub dac_address: u8,
+    /// What is connected to them.
+    pub kind: PortKind,
 }
 
-impl SlotPins {
-    /// No DAC, because the port is not a slot.
-    pub const FIXED: u8 = 0;
+/// What a port is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PortKind {
+    /// A slot for a module.
+    Slot {
+        /// I2C address of the DAC of an analog-output module in this slot, 0x60 to 0x67, different in each slot.
+        dac_address: u8,
+    },
+    /// Digital inputs, for which a low line counts as 1, as in a 4DI.
+    Inputs,
+    /// Digital outputs, which a high line turns on, as in a 4DO.
+    Outputs,
 }
 
 /// The pins of the LoRa radio.
@@ -123,12 +132,12 @@ impl Descriptor {
         false
     }
 
-    /// Returns whether there is a bus to DACs: in every slot can be a module that has one.
+    /// Returns whether there are slots, and with them the bus to the DACs of their modules.
     #[must_use]
-    pub const fn has_dacs(&self) -> bool {
+    pub const fn has_slots(&self) -> bool {
         let mut slot = 0;
         while slot < self.slots.len() {
-            if self.slots[slot].dac_address != SlotPins::FIXED {
+            if matches!(self.slots[slot].kind, PortKind::Slot { .. }) {
                 return true;
             }
             slot += 1;
@@ -145,11 +154,11 @@ impl Descriptor {
         );
         let mut slot = 0;
         while slot < self.slots.len() {
-            let SlotPins { lines, dac_address } = self.slots[slot];
+            let SlotPins { lines, kind } = self.slots[slot];
             let mut line = 0;
             while line < 4 {
                 assert!(
-                    dac_address == SlotPins::FIXED || lines[line].adc_input().is_some(),
+                    !matches!(kind, PortKind::Slot { .. }) || lines[line].adc_input().is_some(),
                     "every line of a slot must be an ADC input"
                 );
                 line += 1;
@@ -159,11 +168,18 @@ impl Descriptor {
     }
 }
 
+const _: () = eth_io5r::BOARD.check();
 const _: () = modio_02::BOARD.check();
 const _: () = modio_08::BOARD.check();
 
-// Set exactly one board feature. With two features BOARD is defined twice, without one it is not defined.
-#[cfg(any(feature = "modio-02", test))]
+// Set exactly one board feature. With two features BOARD is defined twice, without one it is not defined. Tests without a
+// feature are those of the modio-02.
+#[cfg(feature = "eth-io5r")]
+pub use eth_io5r::BOARD;
+#[cfg(any(
+    feature = "modio-02",
+    all(test, not(any(feature = "modio-08", feature = "eth-io5r")))
+))]
 pub use modio_02::BOARD;
 #[cfg(feature = "modio-08")]
 pub use modio_08::BOARD;

@@ -1,6 +1,6 @@
 //! The modio-02: an STM32F103CB, or a C8 on a bare "Blue Pill" with a transceiver. One slot, port 5.
 
-use super::{AddressPins, Descriptor, LinePins, RadioPins, SlotPins};
+use super::{AddressPins, Descriptor, LinePins, PortKind, RadioPins, SlotPins};
 use crate::{
     pin::{Pin, Port},
     usart::Usart,
@@ -18,7 +18,7 @@ pub const BOARD: Descriptor = Descriptor {
     held: &[],
     slots: &[SlotPins {
         lines: [Pin::a(0), Pin::a(1), Pin::a(2), Pin::a(3)],
-        dac_address: 0x60,
+        kind: PortKind::Slot { dac_address: 0x60 },
     }],
     address: AddressPins::Switch([
         Pin::a(4),

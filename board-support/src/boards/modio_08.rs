@@ -1,6 +1,6 @@
 //! The modio-08: an STM32F103RC. Four slots, ports 1 to 4.
 
-use super::{AddressPins, Descriptor, LinePins, RadioPins, SlotPins};
+use super::{AddressPins, Descriptor, LinePins, PortKind, RadioPins, SlotPins};
 use crate::{
     pin::{Pin, Port},
     usart::Usart,
@@ -19,19 +19,19 @@ pub const BOARD: Descriptor = Descriptor {
     slots: &[
         SlotPins {
             lines: [Pin::a(0), Pin::a(1), Pin::a(2), Pin::a(3)],
-            dac_address: 0x60,
+            kind: PortKind::Slot { dac_address: 0x60 },
         },
         SlotPins {
             lines: [Pin::a(4), Pin::a(5), Pin::a(6), Pin::a(7)],
-            dac_address: 0x61,
+            kind: PortKind::Slot { dac_address: 0x61 },
         },
         SlotPins {
             lines: [Pin::c(0), Pin::c(1), Pin::c(2), Pin::c(3)],
-            dac_address: 0x62,
+            kind: PortKind::Slot { dac_address: 0x62 },
         },
         SlotPins {
             lines: [Pin::b(0), Pin::b(1), Pin::c(4), Pin::c(5)],
-            dac_address: 0x63,
+            kind: PortKind::Slot { dac_address: 0x63 },
         },
     ],
     address: AddressPins::Switch([

@@ -65,7 +65,7 @@ const fn modes(port: Port, offset: u32) -> Block {
     }
     let mask = match line_mask(register) {
         Some(mask) => !mask,
-        None if BOARD.has_dacs() && register == Port::B.base() => 0xFFF,
+        None if BOARD.has_slots() && register == Port::B.base() => 0xFFF,
         None => ALL,
     };
     (register, mask, &[0])

@@ -4,7 +4,8 @@ use core::array;
 
 use board_support::{
     DacBus, IoPin, Sampler,
-    boards::{BOARD, SLOTS, SlotPins},
+    boards::{BOARD, PortKind, SLOTS, SlotPins},
+    fitted::{self, Fitted},
 };
 use modio_drivers::{Absent, Ai2Ao2, Ai4, Ao4, DacLink, DacWorker, Di4, Do4, IoModule, Relay2};
 use register_map::Module;
@@ -15,31 +16,39 @@ pub enum Installed {
     None(Absent),
     Di4(Di4<IoPin>),
     Do4(Do4<IoPin>),
-    Relay2(Relay2<IoPin, IoPin>),
-    Ai4(Ai4),
-    Ao4(Ao4),
-    Ai2Ao2(Ai2Ao2),
+    Relay2(Relay2<IoPin, IoPin>, Proof),
+    Ai4(Ai4, Proof),
+    Ao4(Ao4, Proof),
+    Ai2Ao2(Ai2Ao2, Proof),
 }
+
+/// Proof that the board has slots. Other boards do not have these modules.
+type Proof = <fitted::Slots as Fitted>::Proof;
 
 impl Installed {
     /// Configures the slot for a module. `analog` is for the slot's inputs of the ADC.
     fn new(module: Module, slot: &SlotPins, analog: &mut [Option<u8>; 4]) -> Self {
-        match module {
-            Module::None => Self::None(Absent),
-            Module::Di4 => Self::Di4(Di4::new(slot.digital(4))),
-            Module::Do4 => Self::Do4(Do4::new(slot.digital(0))),
-            Module::Relay2 => {
+        let module = match slot.kind {
+            PortKind::Slot { .. } => module,
+            PortKind::Inputs => Module::Di4,
+            PortKind::Outputs => Module::Do4,
+        };
+        match (module, fitted::Slots::proof()) {
+            (Module::Di4, _) => Self::Di4(Di4::new(slot.digital(4))),
+            (Module::Do4, _) => Self::Do4(Do4::new(slot.digital(0))),
+            (Module::None, _) | (_, None) => Self::None(Absent),
+            (Module::Relay2, Some(proof)) => {
                 let [jumper1, jumper2, coil1, coil2] = slot.digital(2);
-                Self::Relay2(Relay2::new([jumper1, jumper2], [coil1, coil2]))
+                Self::Relay2(Relay2::new([jumper1, jumper2], [coil1, coil2]), proof)
             }
-            Module::Ai4 => {
+            (Module::Ai4, Some(proof)) => {
                 *analog = slot.analog(4);
-                Self::Ai4(Ai4::default())
+                Self::Ai4(Ai4::default(), proof)
             }
-            Module::Ao4 => Self::Ao4(Ao4::default()),
-            Module::Ai2Ao2 => {
+            (Module::Ao4, Some(proof)) => Self::Ao4(Ao4::default(), proof),
+            (Module::Ai2Ao2, Some(proof)) => {
                 *analog = slot.analog(2);
-                Self::Ai2Ao2(Ai2Ao2::default())
+                Self::Ai2Ao2(Ai2Ao2::default(), proof)
             }
         }
     }
@@ -50,10 +59,10 @@ impl Installed {
             Self::None(module) => module,
             Self::Di4(module) => module,
             Self::Do4(module) => module,
-            Self::Relay2(module) => module,
-            Self::Ai4(module) => module,
-            Self::Ao4(module) => module,
-            Self::Ai2Ao2(module) => module,
+            Self::Relay2(module, _) => module,
+            Self::Ai4(module, _) => module,
+            Self::Ao4(module, _) => module,
+            Self::Ai2Ao2(module, _) => module,
         }
     }
 }
@@ -68,6 +77,9 @@ pub struct AnalogOutputs {
 impl AnalogOutputs {
     /// Sends pending output values to the DACs.
     pub fn work(&mut self, dacs: &mut impl Mutex<T = [DacLink; SLOTS]>) {
+        if fitted::Slots::proof().is_none() {
+            return;
+        }
         let links = dacs.lock(|dacs| *dacs);
         for (worker, link) in self.workers.iter_mut().zip(links) {
             // After an error the bus is recovered before its next transfer.
@@ -87,7 +99,10 @@ pub fn install(
     sampler: &mut Sampler,
     bus: DacBus,
 ) -> ([Installed; SLOTS], AnalogOutputs) {
-    let workers = array::from_fn(|index| DacWorker::new(BOARD.slots[index].dac_address));
+    let workers = array::from_fn(|index| match BOARD.slots[index].kind {
+        PortKind::Slot { dac_address } => DacWorker::new(dac_address),
+        _ => DacWorker::new(0),
+    });
     let installed = array::from_fn(|index| {
         Installed::new(
             modules[index],

@@ -10,7 +10,7 @@
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use board_support::{Damaged, IoPin, RadioUart, device::interrupt};
+use board_support::{Damaged, IoPin, RadioProof, RadioUart, device::interrupt};
 use embedded_hal_nb::serial::{ErrorKind, ErrorType, Read, Write};
 use firmware::{byte_queue::ByteQueue, radio};
 use rtic::Mutex;
@@ -25,8 +25,8 @@ static TO_SEND: ByteQueue = ByteQueue::new();
 /// A received byte was damaged, or lost because the queue was full.
 static DAMAGED: AtomicBool = AtomicBool::new(false);
 
-/// The UART and the queues as a serial port, for the radio line.
-pub struct Serial;
+/// The UART and the queues as a serial port, for the radio line. Only a board with a radio has one.
+pub struct Serial(pub RadioProof);
 
 /// Handles the UART's interrupt. This code runs from RAM.
 #[inline(always)]

@@ -7,8 +7,9 @@
 
 use board_support::device::interrupt;
 use firmware::{
-    HAS_EVENTS,
+    HAS_EVENTS, HAS_SLOTS,
     config::{LineName, Origin},
+    line,
     start_up::RECOVERY_UNIT,
 };
 use modbus_server::{
@@ -112,6 +113,7 @@ impl Serving {
         {
             self.rs485
                 .serve(request, self.unit.as_mut(), rs485, radio, device);
+            self.change_address(rs485, device);
             served = true;
         }
         if self.radio.order.is_none()
@@ -132,6 +134,26 @@ impl Serving {
     }
 }
 
+impl Serving {
+    /// Puts the unit address in force that a request has set, if any. The other line keeps its address until the restart.
+    fn change_address(
+        &mut self,
+        rs485: &mut impl Mutex<T = Option<Line>>,
+        device: &mut impl Mutex<T = &'static mut Device>,
+    ) {
+        if HAS_SLOTS {
+            return;
+        }
+        let fast = self.unit.is_some();
+        if let Some(unit) = device.lock(|device| device.take_unit())
+            && let Some(units) = line::units(Some(unit), fast)
+        {
+            self.unit.as_mut().map(|fast| fast.set_address(unit));
+            rs485.lock(|line| line.as_mut().map(|line| line.set_units(units)));
+        }
+    }
+}
+
 impl Served {
     /// Serves a request of this line and sends its reply.
     // Not inlined: one copy serves both lines.
@@ -144,9 +166,10 @@ impl Served {
         radio: &mut impl Mutex<T = Option<Radio>>,
         device: &mut impl Mutex<T = &'static mut Device>,
     ) {
-        let origin = Origin {
+        let mut origin = Origin {
             line: self.line,
             broadcast: request.unit() == BROADCAST,
+            by_serial: false,
         };
         let ended = request.ended();
         let mut unit = unit.filter(|_| HAS_EVENTS && request.unit() == fast::ADDRESS);
@@ -155,6 +178,7 @@ impl Served {
         {
             return self.serve_for_all(request, unit, rs485, device);
         }
+        origin.by_serial = unit.is_some();
         let (mut reply, delay_ms) = device.lock(|device| {
             let delay_ms = device.config.response_delay_ms();
             device.set_origin(origin);
@@ -192,7 +216,7 @@ impl Served {
         let (reply, contest) = device.lock(|device| {
             device.set_origin(Origin {
                 line: self.line,
-                broadcast: false,
+                ..Origin::default()
             });
             self.server.serve_fast(request, unit, &mut **device)
         });

@@ -23,6 +23,7 @@ use modbus_server::{
 use modio_drivers::DacLink;
 use register_map::{
     codes::{Format, GapRule, Mode},
+    configuration::UNIT,
     state::{build as build_bits, reset_cause::POWER_ON},
     update::{DEVELOPMENT_KEY, Header},
 };
@@ -79,16 +80,17 @@ pub fn up(
     let mut log = Log::new();
     let masked = rtic::export::cortex_logical2hw(SERVE_PRIORITY, pac::NVIC_PRIO_BITS);
     let mut board = board::setup(device, scb, masked);
-    let dip = if board.as_255 {
-        RECOVERY_UNIT
-    } else {
-        board.dip
-    };
-    let address = Address::from_dip(dip, SLOT.is_some());
-
     let mut pages = board.flash;
     let mut store = Store::open(&pages);
     let loaded = store.load(BOARD, &pages);
+    let number = if board.as_255 {
+        RECOVERY_UNIT
+    } else if BOARD.switch {
+        board.dip
+    } else {
+        loaded.settings.get(UNIT) as u8
+    };
+    let address = Address::from_dip(number, SLOT.is_some());
     let settings = start_up::line(address, LineConfig::of(&loaded.settings));
     let radio_config = RadioConfig::of(&loaded.settings);
     let mut config = Config::new(
@@ -194,9 +196,17 @@ pub fn up(
     let (radio, radio_uart) = radio_config
         .and_then(|config| {
             let units = line::units(address.unit(), false)?;
-            let (uart, mode, aux) = board.radio.start(&mut board.rcc)?;
+            let (uart, mode, aux, proof) = board.radio.start(&mut board.rcc)?;
             let power_on = u16::from(board.reset_cause) & POWER_ON != 0;
-            let radio = Radio::new(Serial, mode, aux, config, units, power_on, radio_adus);
+            let radio = Radio::new(
+                Serial(proof),
+                mode,
+                aux,
+                config,
+                units,
+                power_on,
+                radio_adus,
+            );
             Some((radio, uart))
         })
         .unzip();

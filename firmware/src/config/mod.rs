@@ -46,7 +46,7 @@ use lock::Lock;
 pub use origin::{LineName, Origin};
 use saves::Saves;
 pub use settings::RestartValues;
-use settings::{RESTARTS, format_suits_mode, port_of, takes_module};
+use settings::{RESTARTS, format_suits_mode, port_of, restart_addresses, takes_module};
 pub use settings::{Settings, kinds};
 
 /// How far a save is.
@@ -353,6 +353,42 @@ impl<const SLOTS: usize> Config<SLOTS> {
             self.save = Save::Ordered;
         }
         command
+    }
+
+    /// Checks whether the unit address may be written by serial number.
+    ///
+    /// # Errors
+    ///
+    /// Exception 02 on a board with a switch, and in a request to the unit address; 03 for a value that is not a unit
+    /// address; 06 while a save is under way, or when nothing is left of the budget.
+    pub fn check_unit(&self, unit: Option<u16>) -> Result<(), Exception> {
+        if HAS_SLOTS || self.board.switch || !self.origin.by_serial {
+            return Err(Exception::IllegalDataAddress);
+        }
+        match unit {
+            Some(unit) if !(1..=247).contains(&unit) => Err(Exception::IllegalDataValue),
+            Some(unit)
+                if !self.has_save() && (self.saves.left() > 0 || unit == self.saved.get(UNIT)) =>
+            {
+                Ok(())
+            }
+            _ => Err(Exception::ServerDeviceBusy),
+        }
+    }
+
+    /// Sets the unit address, which [`Self::check_unit`] has accepted, and begins a save of this alone.
+    pub fn set_unit(&mut self, unit: u16) {
+        self.edited.set(UNIT, unit);
+        if self.saved.get(UNIT) != unit {
+            self.saved.set(UNIT, unit);
+            self.save = Save::Begun;
+        }
+        for (started, address) in self.started.iter_mut().zip(restart_addresses()) {
+            if address == UNIT {
+                *started = unit;
+            }
+        }
+        self.revision = self.revision.wrapping_add(1);
     }
 
     /// Compares the edited settings with the others after [`revision`](Self::revision) has changed, before

@@ -18,4 +18,6 @@ pub struct Origin {
     pub line: LineName,
     /// The request is for all units.
     pub broadcast: bool,
+    /// The request has named this unit by its serial number, with function 70.
+    pub by_serial: bool,
 }

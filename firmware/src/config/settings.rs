@@ -173,9 +173,7 @@ impl<const SLOTS: usize> Settings<SLOTS> {
 
     /// Returns the settings that need a restart, in the order of their addresses.
     pub(super) fn restart_values(&self) -> impl Iterator<Item = u16> {
-        Addresses::from(KEY)
-            .filter(|(rule, _)| rule.in_force == InForce::Restart)
-            .map(|(_, address)| self.get(address))
+        restart_addresses().map(|address| self.get(address))
     }
 
     /// Returns the kind of the point of a setting by point, or none for other settings.
@@ -290,6 +288,13 @@ pub(super) fn port_of(address: u16) -> Option<u16> {
 /// Returns whether the registers of a rule hold a setting.
 const fn holds(rule: &Rule) -> bool {
     rule.first != KEY && rule.first != COMMAND
+}
+
+/// Iterates over the addresses of the settings that need a restart.
+pub(super) fn restart_addresses() -> impl Iterator<Item = u16> {
+    Addresses::from(KEY)
+        .filter(|(rule, _)| rule.in_force == InForce::Restart)
+        .map(|(_, address)| address)
 }
 
 /// Iterates over every address that holds a setting, with its rule, in ascending order.

@@ -48,9 +48,9 @@ pub use points::Points;
 pub use port::IoPort;
 pub use state::{Identity, State};
 
-use crate::HAS_EVENTS;
 use crate::config::{Config, LineName, Origin, Point};
 use crate::update::{Order, TRIAL_S, Update};
+use crate::{HAS_EVENTS, HAS_SLOTS};
 
 /// The device behind the line, on a board with `SLOTS` slots.
 #[derive(Debug)]
@@ -73,6 +73,8 @@ pub struct Device<const SLOTS: usize> {
     events: Events<SLOTS>,
     /// A command from a request, to be executed when its reply has been sent.
     ordered: Option<Command>,
+    /// The unit address, after a master has changed it.
+    new_unit: Option<u8>,
     /// The device is to restart once no save is under way.
     pub restart: Option<Restart>,
     /// The update over the line; `None` without a loader.
@@ -158,6 +160,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
             linked: 0,
             events: Events::new(),
             ordered: None,
+            new_unit: None,
             restart: None,
             update: None,
             identify: false,
@@ -270,6 +273,13 @@ impl<const SLOTS: usize> Device<SLOTS> {
         self.activity = true;
         self.settings_may_have_changed();
         self.ordered.take()
+    }
+
+    /// Takes the unit address that a request has set, which is in force from now on.
+    pub fn take_unit(&mut self) -> Option<u8> {
+        let unit = self.new_unit.take()?;
+        self.state.set_unit(unit);
+        Some(unit)
     }
 
     /// Executes a command of this line whose reply has been sent. The background task does what is left: a save that has begun,
@@ -419,6 +429,9 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
                 }
                 checked
             }
+            Block::ReadOnly if span == Span::single(name::UNIT_BY_SERIAL) => {
+                self.config.check_unit(words.get(0))
+            }
             Block::ReadOnly => Err(Exception::IllegalDataAddress),
             Block::Pulses => {
                 check_exists(&[counters::SPANS], span)?;
@@ -464,8 +477,13 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
                 self.ordered = self.config.write(span, words);
             }
             Block::Pulses => self.points.clear_pulses(span),
-            // `check_write_words` rejects writes to these registers.
-            Block::ReadOnly => {}
+            // Of these registers `check_write_words` accepts only UNIT_BY_SERIAL.
+            Block::ReadOnly => {
+                if !HAS_SLOTS && let Some(unit) = words.get(0) {
+                    self.config.set_unit(unit);
+                    self.new_unit = Some(unit as u8);
+                }
+            }
         }
     }
 

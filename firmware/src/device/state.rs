@@ -110,6 +110,11 @@ impl State {
         }
     }
 
+    /// Sets the unit address in force.
+    pub(super) const fn set_unit(&mut self, unit: u8) {
+        self.identity.unit = unit;
+    }
+
     /// Returns the unique identity as text.
     pub(super) const fn serial(&self) -> &[u8; SERIAL_LEN] {
         &self.serial

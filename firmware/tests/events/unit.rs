@@ -161,6 +161,7 @@ impl Unit {
         self.device.set_origin(Origin {
             line: LineName::Rs485,
             broadcast: false,
+            by_serial: false,
         });
         if request.unit() == fast::ADDRESS {
             let (reply, contest) = self.server.serve_fast(request, &mut self.fast, self.device);

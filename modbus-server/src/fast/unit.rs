@@ -78,6 +78,11 @@ impl Unit {
         }
     }
 
+    /// Sets the unit address, which has changed.
+    pub const fn set_address(&mut self, address: u8) {
+        self.address = address;
+    }
+
     /// Opens a request to [`ADDRESS`] if it is for this unit alone, by its serial number: it is the request inside then, to
     /// be served by [`Server::serve`]. [`close`](Self::close) its reply.
     #[must_use]

@@ -81,6 +81,11 @@ impl<'a, U: Units> Port<'a, U> {
         }
     }
 
+    /// Sets the unit addresses, which have changed, for the requests that end from now on.
+    pub fn set_units(&mut self, units: U) {
+        self.receiver.set_units(units);
+    }
+
     /// Processes a received character and its faults. Returns whether [`ends_fast_message`](Self::ends_fast_message)
     /// must be called: only on a line with a [`FastUnit`](super::FastUnit).
     #[inline(always)]

@@ -53,6 +53,11 @@ impl<'a, U: Units> Receiver<'a, U> {
         Self::new(units, false, width, ASCII | IDLE | UNKEPT)
     }
 
+    /// Sets the unit addresses.
+    pub(super) fn set_units(&mut self, units: U) {
+        self.units = units;
+    }
+
     const fn new(units: U, strict_t15: bool, width: Width, state: u16) -> Self {
         Self {
             units,

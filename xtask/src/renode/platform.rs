@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use board_support::boards::{modio_02, modio_08};
 use board_support::design::SYSCLK_ON_HSE_HZ;
-use register_map::Board;
 
 use crate::build;
+use crate::test::MODIO;
 use crate::toolchain::TARGET;
 
 /// Pins with the same use on every board.
@@ -33,7 +33,7 @@ fn assert_has(file: &str, lines: &str) {
 
 #[test]
 fn memories_and_clocks_are_those_of_the_part() {
-    for board in Board::ALL {
+    for board in MODIO {
         let file = format!("{board}.repl");
         let part = board.memory().part;
         assert_has(&file, &format!("\nflash:\n    size: {:#x}\n", part.flash));
@@ -102,7 +102,7 @@ fn pins_are_those_of_the_board() {
 
 #[test]
 fn commands_know_where_the_configuration_is() {
-    for board in Board::ALL {
+    for board in MODIO {
         let store = board.store;
         let (first, bytes) = (store.first, 2 * store.bytes);
         assert_has(
@@ -114,7 +114,7 @@ fn commands_know_where_the_configuration_is() {
 
 #[test]
 fn scripts_name_files_that_exist_and_the_image_that_is_built() {
-    for board in Board::ALL {
+    for board in MODIO {
         let elf = build::target(Path::new("../target"), board);
         let elf = elf.join(TARGET).join(build::PROFILE).join("modio");
         assert_has(

@@ -108,3 +108,47 @@ fn unit_exists_without_a_switch_and_lora_with_a_radio() {
         Err(Exception::IllegalDataAddress)
     );
 }
+
+#[test]
+fn address_is_written_by_serial_number_and_stored_alone() {
+    let mut config = on::<4>(&ETH_IO5R, &[]);
+    assert_eq!(
+        config.check_unit(Some(5)),
+        Err(Exception::IllegalDataAddress),
+        "to the unit address"
+    );
+    config.set_origin(Origin {
+        by_serial: true,
+        ..Origin::default()
+    });
+    for wrong in [0, 248, 0x0101] {
+        assert_eq!(
+            config.check_unit(Some(wrong)),
+            Err(Exception::IllegalDataValue)
+        );
+    }
+    assert_eq!(write(&mut config, FILTER, &[9]), DONE);
+    assert_eq!(config.check_unit(Some(5)), Ok(()));
+    config.set_unit(5);
+    config.compare();
+    assert!(config.is_saving() && config.check_unit(Some(6)) == Err(Exception::ServerDeviceBusy));
+    let stored: Vec<_> = config.to_save().changed_from(UNIT).take(1).collect();
+    assert_eq!(stored, [(UNIT, 5)]);
+    assert_eq!(
+        config.to_save().get(FILTER),
+        5,
+        "another setting is not stored with it"
+    );
+    assert_eq!(config.take_save(), Some(SAVES - 1));
+    let changed = config.to_save().needs_restart(&config.started());
+    config.end_save(changed);
+    assert_eq!(read(&config, UNIT, 1).unwrap(), [5]);
+    assert_eq!(
+        config.status() & (status::RESTART_NEEDED | status::UNSAVED),
+        status::UNSAVED
+    );
+
+    config.set_saves_left(0);
+    assert_eq!(config.check_unit(Some(6)), Err(Exception::ServerDeviceBusy));
+    assert_eq!(config.check_unit(Some(5)), Ok(()), "nothing to store");
+}

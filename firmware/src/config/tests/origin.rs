@@ -5,16 +5,19 @@ use super::*;
 const OVER_THE_AIR: Origin = Origin {
     line: LineName::Radio,
     broadcast: false,
+    by_serial: false,
 };
 const OVER_THE_CABLE: Origin = Origin {
     line: LineName::Rs485,
     broadcast: false,
+    by_serial: false,
 };
 
 fn broadcast(line: LineName) -> Origin {
     Origin {
         line,
         broadcast: true,
+        by_serial: false,
     }
 }
 
@@ -51,6 +54,7 @@ fn a_broadcast_over_the_air_writes_nothing_and_one_over_the_cable_does() {
         config.set_origin(Origin {
             line,
             broadcast: false,
+            by_serial: false,
         });
         assert_eq!(write(&mut config, KEY, &[OPENING_KEY]), DONE);
         config.set_origin(broadcast(line));

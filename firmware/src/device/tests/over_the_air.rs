@@ -9,6 +9,7 @@ fn bench(lora: u16) -> Bench {
     bench.device.set_origin(Origin {
         line: LineName::Radio,
         broadcast: false,
+        by_serial: false,
     });
     bench.scan(|_| {});
     bench.scan(|channels| channels.set_bit(0, true));

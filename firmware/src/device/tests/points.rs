@@ -281,6 +281,7 @@ fn comm_source_selects_the_requests_that_restart_the_communication_watchdog() {
             bench.device.set_origin(Origin {
                 line,
                 broadcast: false,
+                by_serial: false,
             });
             assert!(!bench.device.tick(50));
             bench.device.request_seen(50, writes);

@@ -111,6 +111,7 @@ fn preparation_over_the_air_needs_a_radio_with_settings() {
         bench.device.set_origin(Origin {
             line: LineName::Radio,
             broadcast: false,
+            by_serial: false,
         });
         let _ = bench.ask(&[6, 1, 0, 0x5A, 0x17]);
         assert_eq!(bench.write(at::COMMAND, &[PREPARE]), answer);

@@ -11,7 +11,7 @@ use crate::failure::Failure;
 use crate::output;
 
 /// Register of the unit address for clients of function 70: it is stored, and in force after the reply.
-const UNIT: u16 = 0x0080;
+const UNIT: u16 = register_map::name::UNIT_BY_SERIAL;
 
 /// Sets the address of the unit with this serial number.
 pub async fn run(mut master: Master, options: &Address) -> Result<(), Failure> {

@@ -1,0 +1,41 @@
+//! What a board has, as types. A value that contains the proof of something that the board does not have cannot exist, so
+//! the compiler leaves out all code for it.
+
+use core::convert::Infallible;
+
+use crate::boards::BOARD;
+
+/// A condition that is known at compile time.
+pub struct If<const YES: bool>;
+
+/// Something that a board has or does not have.
+pub trait Fitted {
+    /// A type with one value if the board has it, and without values if not.
+    type Proof: Copy;
+
+    /// Returns the proof, if there is one.
+    fn proof() -> Option<Self::Proof>;
+}
+
+impl Fitted for If<true> {
+    type Proof = ();
+
+    #[inline(always)]
+    fn proof() -> Option<()> {
+        Some(())
+    }
+}
+
+impl Fitted for If<false> {
+    type Proof = Infallible;
+
+    #[inline(always)]
+    fn proof() -> Option<Infallible> {
+        None
+    }
+}
+
+/// The radio.
+pub type Radio = If<{ BOARD.radio.is_some() }>;
+/// Slots for modules.
+pub type Slots = If<{ BOARD.has_slots() }>;
