@@ -5,7 +5,7 @@ use register_map::links::NO_SOURCE;
 use serde_json::{Value as Json, json};
 
 use super::write::UNSAVED;
-use crate::device::{Device, fetch};
+use crate::device::{Device, fetch_set};
 use crate::failure::Failure;
 use crate::links::{self, Order, action_of, acts, is_alone, sentence};
 use crate::names::{Book, Item};
@@ -14,7 +14,7 @@ use crate::value::point_name;
 
 /// Prints the links of the unit.
 pub async fn list(device: &mut Device, json: bool) -> Result<(), Failure> {
-    let book = fetch(device).await?.book;
+    let book = fetch_set(device).await?;
     let items = links::all(&book)?;
     let values = device.read_items(&items).await?;
     let used = items.iter().zip(&values);
@@ -48,7 +48,7 @@ fn as_json(book: &Book, item: &Item, words: &[u16]) -> Json {
 
 /// Writes the link in `text`, or deletes the links of an output.
 pub async fn link(device: &mut Device, text: &str) -> Result<(), Failure> {
-    let book = fetch(device).await?.book;
+    let book = fetch_set(device).await?;
     let changes = match text.split_whitespace().collect::<Vec<_>>()[..] {
         ["none", output] => {
             let (_, items) = links::of_output(&book, output)?;

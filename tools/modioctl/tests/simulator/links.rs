@@ -52,4 +52,9 @@ fn link_is_written_acts_and_is_listed_until_it_is_deleted() {
     assert_eq!(json[0]["if_alone"], true, "{json}");
     at.run("link none p2.1").fine();
     assert_eq!(at.run("links").fine(), "no links\n");
+
+    // A module that is set has links before it is in force.
+    at.run("write p4.module=4do").fine();
+    at.run("link p1.1 toggles p4.1").fine();
+    assert_eq!(at.run("links").fine(), "p4.1.link1  p1.1 toggles p4.1\n");
 }
