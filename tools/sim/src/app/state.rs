@@ -316,7 +316,7 @@ fn radio(module: &radio::Module) -> Radio {
 }
 
 /// Returns the unit address in force; `None` without power, and if the switch had no valid position at power-on.
-fn address(board: &Board) -> Option<u8> {
+pub fn address(board: &Board) -> Option<u8> {
     let dip = board.dip_at_power_on();
     (board.powered() && matches!(dip, 1..=247 | 255)).then_some(dip)
 }

@@ -26,6 +26,7 @@ pub fn description() -> Description {
         super::post_faults,
         super::post_dip,
         super::post_power,
+        super::pdu::post,
         super::post_module,
         super::post_channel,
         super::post_slot_module,

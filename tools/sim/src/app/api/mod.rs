@@ -8,6 +8,7 @@
 
 mod body;
 mod description;
+mod pdu;
 
 use std::collections::BTreeMap;
 
@@ -126,6 +127,7 @@ fn of_path(
         "faults" if request.method == "GET" => Ok(get_faults(bench, n)),
         "faults" => post_faults(bench, n, request),
         "dip" => post_dip(bench, n, request),
+        "pdu" => pdu::post(bench, n, request),
         "power" => post_power(bench, n, request),
         _ => return of_slot(bench, n, request, path),
     })
