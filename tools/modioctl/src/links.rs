@@ -37,7 +37,7 @@ pub fn of_output(book: &Book, name: &str) -> Result<(String, Vec<Item>), Failure
     let links: Vec<_> = of(book, &point.name).collect();
     if links.is_empty() {
         return Err(Failure::usage(format!(
-            "{} is no digital output, but {}: only digital outputs have links",
+            "{} is no digital output, but {}: only digital outputs have links (an output is the first word with `follows` and `inverts`, else it follows the verb)",
             point.name,
             with_article(&point)
         )));

@@ -4,10 +4,11 @@ use axum::Router;
 use axum::http::header;
 use axum::response::IntoResponse;
 use axum::routing::get;
+use register_map::Module;
 use register_map::codes::{Command, LinkAction};
 use register_map::configuration::{COMMAND, KEY, OPENING_KEY, RANGE, SCALE};
 use register_map::links::LINKS;
-use register_map::{Module, points};
+use register_map::points::{self, Kind};
 use serde_json::json;
 
 const HTML: &str = "text/html; charset=utf-8";
@@ -56,9 +57,7 @@ fn map() -> String {
         "links": LINKS, "key": KEY, "openingKey": OPENING_KEY, "command": COMMAND, "save": Command::Save.code(),
         "range": RANGE, "scale": SCALE,
     });
-    // The points of all modules with analog inputs have the same values.
-    let [analog, ..] = Module::Ai4.points();
-    let readings = points::readings(analog).iter().map(|reading| {
+    let readings = points::readings(Kind::WordInput).iter().map(|reading| {
         json!([
             reading.signal.code(),
             reading.scale.code(),

@@ -28,9 +28,11 @@ let meaning = [];
 /** Fulfilled when the last change has been written. */
 let previous = Promise.resolve();
 
-/** Returns the points that can be the source or the output of a link. A relay has its jumper, and its coil two higher. */
+/** Returns the points that can be the source or the output of a link. A relay has its jumper, and its coil two higher.
+ * The unit does not serve the points of a module that is not the configured one. */
 function pointsOf(state) {
-  const all = slotsOf(state).flatMap((slot) => slot.channels.flatMap(({ kind }, n) => {
+  const slots = slotsOf(state).filter(({ module, configured }) => module === configured);
+  const all = slots.flatMap((slot) => slot.channels.flatMap(({ kind }, n) => {
     const point = (number) => ({ port: slot.port, kind, name: pointName(slot.port, number), address: Number(address(slot.port, number)) });
     const made = { di: [point(n + 1)], ai: [point(n + 1)], do: [point(n + 1)], relay: [point(n + 1), point(n + 3)] }[kind] ?? [];
     return made.map((each, coil) => ({ ...each, isOutput: kind === "do" || coil === 1 }));
@@ -59,6 +61,7 @@ export function forget() {
 async function readAll() {
   const label = "Links";
   const found = [];
+  const before = links;
   // The outputs of a module have consecutive addresses.
   for (const outputs of Object.values(Object.groupBy(points.outputs, ({ port }) => port))) {
     for (const number of [1, 2]) {
@@ -76,6 +79,8 @@ async function readAll() {
     if (ranges === null || scales === null) return;
     meaning = ranges.map((range, n) => [range, scales[n]]);
   }
+  // The user may have chosen another board.
+  if (links !== before) return;
   links = found;
   draw();
 }
@@ -84,6 +89,8 @@ async function readAll() {
  * the unit then has. */
 function change(link, words) {
   previous = previous.then(async () => {
+    // The user may have chosen another board.
+    if (!links.includes(link)) return;
     const before = link.words;
     const wanted = words(before);
     const isWritten = await modbus.write(link.register, wanted, `Link ${link.number} of ${link.output}`);
