@@ -54,6 +54,19 @@ pub struct Cli {
     pub command: Command,
 }
 
+const LINK_HELP: &str = "\
+p1.1 toggles p2.1                                a button: each press inverts the output
+p1.1 sets p2.1, p1.1 resets p2.1                 a press switches the output on, off
+p1.1 pulses p2.1 for 90s                         a press switches the output on for 90 s
+p2.1 follows p1.1, p2.1 inverts p1.1             the output is as the input, or its opposite
+p3.1 switches p2.1 on above 18.0 off below 15.0  an analog input, in its unit
+p3.1 switches p2.1 on below 15.0 off above 18.0
+... if alone                                     the link acts only while the master is gone
+none p2.1                                        deletes the links of the output
+
+An output has two links. The command writes the one that has this input, or else a free one. It is in force immediately; \
+`modioctl config save` keeps it.";
+
 /// A command.
 #[derive(Subcommand, Debug)]
 pub enum Command {
@@ -73,6 +86,15 @@ pub enum Command {
     /// Read and change the unit's settings
     #[command(subcommand)]
     Config(Config),
+    /// List the links of the unit: inputs that switch outputs without a master
+    Links,
+    /// Let an input switch a digital output of the same unit without a master
+    #[command(after_help = LINK_HELP)]
+    Link {
+        /// The link in words, such as p1.1 toggles p2.1
+        #[arg(required = true, value_name = "WORD", allow_negative_numbers = true)]
+        words: Vec<String>,
+    },
     /// Print values repeatedly, until Ctrl-C
     Watch(Watch),
     /// Print what changes in all units, as soon as it does, until Ctrl-C (Fast Modbus)

@@ -93,7 +93,8 @@ fn register(value: &Value, words: &[u16], raw: bool) -> Shown {
 /// The address that stands for no point.
 const NO_POINT: u16 = 0xFFFF;
 
-fn point_name(address: u16) -> String {
+/// Returns the name of the point with this address.
+pub fn point_name(address: u16) -> String {
     format!("p{}.{}", address / 4 + 1, address % 4 + 1)
 }
 
@@ -201,6 +202,12 @@ pub fn parse(item: &Item, text: &str, raw: bool) -> Result<Vec<u16>, Failure> {
         .map_err(|takes| Failure::usage(format!("{name} does not allow {text:?}: {takes}")))
 }
 
+/// Returns the words for the value in `text`, also for an item that can only be read. The error contains only the allowed
+/// values.
+pub fn words_of(item: &Item, text: &str) -> Result<Vec<u16>, String> {
+    words(item, text, false)
+}
+
 /// As [`parse`], for an item that can be written. The error contains only the allowed values.
 fn words(item: &Item, text: &str, raw: bool) -> Result<Vec<u16>, String> {
     let word = number_of(text);
@@ -295,7 +302,7 @@ fn check_raw(item: &Item, word: u16) -> Result<(), String> {
 
 /// Returns a quantity in steps of the unit; `None` when it is not a number, has another unit, or lies between two
 /// steps.
-fn steps(text: &str, unit: &Unit) -> Option<i64> {
+pub fn steps(text: &str, unit: &Unit) -> Option<i64> {
     let shown = unit_name(&unit.code);
     let text = text.trim();
     let number = text.strip_suffix(shown).or(text.strip_suffix(&unit.code));

@@ -5,6 +5,7 @@ mod describe;
 mod export;
 mod fast;
 mod info;
+mod links;
 mod module;
 mod ports;
 mod raw;
@@ -111,6 +112,8 @@ async fn dispatch(mut cli: Cli, note: &Note) -> Result<(), Failure> {
         Command::Write(options) => write::run(&mut device, &options).await,
         Command::Module(options) => module::run(device, options).await,
         Command::Config(options) => config::run(device, options, json, note).await,
+        Command::Links => links::list(&mut device, json).await,
+        Command::Link { words } => links::link(&mut device, &words.join(" ")).await,
         Command::Watch(options) => watch::run(device, &options).await,
         Command::Events(options) => fast::events::run(device, &options, json).await,
         Command::Address(options) => fast::address::run(device.master, &options).await,

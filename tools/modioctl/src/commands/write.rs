@@ -9,6 +9,9 @@ use crate::names::Item;
 use crate::output;
 use crate::value::{parse, show};
 
+/// Line that reports that settings are in force and not saved.
+pub const UNSAVED: &str = "not saved: save with `modioctl config save`";
+
 /// Writes items by name or address, after all of them have been checked. When a name or a value is wrong, nothing is
 /// written.
 pub async fn run(device: &mut Device, options: &Write) -> Result<(), Failure> {
@@ -19,15 +22,7 @@ pub async fn run(device: &mut Device, options: &Write) -> Result<(), Failure> {
         let words = parse(&item, text, options.raw)?;
         checked.push((item, words));
     }
-    let is_locked = |item: &Item| item.setting || item.name == "COMMAND";
-    if checked.iter().any(|(item, _)| is_locked(item)) {
-        device.unlock().await?;
-    }
-    let settings = checked.iter().filter(|(item, _)| item.setting);
-    device.warn_of_line(settings.map(|(item, _)| item.address));
-    for (item, words) in &checked {
-        device.write_item(item, words).await?;
-    }
+    device.write_items(&checked).await?;
     let mut unsaved = false;
     for (item, words) in &checked {
         unsaved |= item.setting;
@@ -40,12 +35,26 @@ pub async fn run(device: &mut Device, options: &Write) -> Result<(), Failure> {
         output::line(format_args!("{} = {value}{when}", item.name))?;
     }
     if unsaved {
-        output::line("not saved: save with `modioctl config save`")?;
+        output::line(UNSAVED)?;
     }
     Ok(())
 }
 
 impl Device {
+    /// Writes items whose values have been checked. Opens the lock if one of them needs that.
+    pub async fn write_items(&mut self, checked: &[(Item, Vec<u16>)]) -> Result<(), Failure> {
+        let is_locked = |item: &Item| item.setting || item.name == "COMMAND";
+        if checked.iter().any(|(item, _)| is_locked(item)) {
+            self.unlock().await?;
+        }
+        let settings = checked.iter().filter(|(item, _)| item.setting);
+        self.warn_of_line(settings.map(|(item, _)| item.address));
+        for (item, words) in checked {
+            self.write_item(item, words).await?;
+        }
+        Ok(())
+    }
+
     /// Writes an item.
     pub async fn write_item(&mut self, item: &Item, words: &[u16]) -> Result<(), Failure> {
         let about = format!("writing {}", item.name);

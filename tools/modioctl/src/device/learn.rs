@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use etcetera::BaseStrategy;
 use modio_description::{Description, FILE, HEAD, checksum, describe, records};
-use register_map::configuration::{RANGE, SCALE};
+use register_map::configuration::{MODULE, RANGE, SCALE};
 use register_map::{Board, Module, points, state};
 
-use super::Device;
+use super::{Device, with_modules};
 use crate::failure::Failure;
 use crate::names::Book;
 
@@ -41,6 +41,18 @@ pub async fn fetch(device: &mut Device) -> Result<Learned, Failure> {
         book: Book::new(description, readings),
         source,
     })
+}
+
+/// Learns the names of a unit as they are with the modules that were set last. Settings by point and links belong to these
+/// modules, which may not be in force yet.
+pub async fn fetch_set(device: &mut Device) -> Result<Book, Failure> {
+    let book = fetch(device).await?.book;
+    let description = book.of_modio()?.clone();
+    let modules = device.read_words(MODULE, points::PORTS).await?;
+    let set = |port: u8| modules.get(usize::from(port.max(1)) - 1).copied();
+    let description = with_modules(description, set);
+    let readings = readings(device, &description).await?;
+    Ok(Book::new(description, readings))
 }
 
 /// Returns the unit's description and its source; `None` for a unit that is not a modio.

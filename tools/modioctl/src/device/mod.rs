@@ -7,7 +7,7 @@ mod several;
 use modbus_line::adu::{pdu, words_of, write_words};
 use modbus_line::names;
 
-pub use learn::{fetch, known};
+pub use learn::{fetch, fetch_set, known};
 pub use orders::with_modules;
 
 use crate::bus::endpoint::{Endpoint, Place};

@@ -2,7 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::names::{Book, Item, Meaning, PortItems};
+use crate::links;
+use crate::names::{Book, Item, Meaning, PortItems, port_of};
 
 /// Values by the name of their item.
 pub type Words = BTreeMap<String, Vec<u16>>;
@@ -32,6 +33,8 @@ pub struct Plan {
     pub settings: Vec<Item>,
     /// Counters of the line, read less often.
     pub counters: Vec<Item>,
+    /// Links of the outputs, read with the counters.
+    pub links: Vec<Item>,
 }
 
 impl Plan {
@@ -59,6 +62,7 @@ impl Plan {
         let counters = COUNTERS.iter().filter_map(|name| found(name));
         Self {
             counters: counters.collect(),
+            links: links::all(book).unwrap_or_default(),
             ports,
             state,
             settings,
@@ -110,6 +114,12 @@ impl Plan {
         waiting.map(|port| port.number).collect()
     }
 
+    /// Returns the links of all ports except these, whose new modules may not have them.
+    pub fn links_without(&self, ports: &BTreeSet<u8>) -> Vec<Item> {
+        let is_known = |item: &&Item| port_of(&item.name).is_none_or(|port| !ports.contains(&port));
+        self.links.iter().filter(is_known).cloned().collect()
+    }
+
     fn unsettled(&self, port: &PortItems, words: &Words) -> bool {
         let module = words.get(&format!("p{}.module", port.number));
         module.is_some_and(|module| module.first() != Some(&port.code))
@@ -125,9 +135,10 @@ pub const fn is_analog(item: &Item) -> bool {
 mod tests {
     use modio_description::describe;
     use register_map::Module;
-    use register_map::board::MODIO_02;
+    use register_map::board::{MODIO_02, MODIO_08};
 
     use super::*;
+    use crate::names::book;
 
     fn plan() -> Plan {
         let mut readings = vec![(0, 0); 32];
@@ -158,6 +169,15 @@ mod tests {
         assert!(has(&plan.state, "p5.module_state") && has(&plan.state, "p5.module_in_force"));
         assert!(has(&plan.settings, "p5.1.range") && has(&plan.settings, "p5.4.scale"));
         assert_eq!(plan.counters.len(), COUNTERS.len());
+    }
+
+    #[test]
+    fn links_of_a_port_that_waits_for_a_restart_are_not_read() {
+        let plan = Plan::new(&book(&MODIO_08, Module::Do4, (0, 0)));
+        assert_eq!(plan.links_without(&BTreeSet::new()).len(), 2 * 4 * 4);
+        let without = plan.links_without(&BTreeSet::from([2, 3]));
+        assert_eq!(without.len(), 2 * 2 * 4);
+        assert!(without.iter().all(|item| !item.name.starts_with("p2.")));
     }
 
     #[test]

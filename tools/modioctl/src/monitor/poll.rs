@@ -173,6 +173,7 @@ impl Poller {
             && let Some(device) = &mut self.device
         {
             read(device, &plan.counters, &mut words).await?;
+            read(device, &plan.links_without(&self.waiting), &mut words).await?;
             self.counted = Some(Instant::now());
         }
         Ok(Round::Complete(Box::new(Polled {

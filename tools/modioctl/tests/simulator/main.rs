@@ -11,6 +11,7 @@ mod fast;
 mod gateway;
 mod hostile;
 mod importing;
+mod links;
 mod listening;
 mod monitor;
 mod newer;

@@ -82,6 +82,12 @@ class Board:
         """Switches the power off and on again."""
         return self._post("power", {"cycle": True})
 
+    def request(self, pdu: bytes) -> bytes:
+        """Sends a request to the unit, as another master on the line does, and returns the reply. Both are function code
+        and data, without address and CRC. The reply may be an exception. RefusedError when the unit does not reply."""
+        reply = self._http.ask("POST", f"{self._path}/pdu", {"pdu": pdu.hex()})
+        return bytes.fromhex(reply["pdu"])
+
     def faults(self) -> Faults:
         """Returns the faults that are set."""
         faults: Faults = self._get("faults")

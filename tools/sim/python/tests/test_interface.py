@@ -30,6 +30,7 @@ BOARDS = [{"name": name, "board": "modio-02", "dip": 1, "address": 1, "powered":
 CALLS = {
     "board": [{"name": "one"}], "boards": [{}], "endpoints": [{}], "events": [{}], "faults": [{}], "findings": [{}], "frames": [{"since": 7}],
     "openapi": [{}], "power_cycle": [{}], "power_off": [{}], "power_on": [{}],
+    "request": [{"pdu": b"\x07"}],
     "set_channel": [{"channel": 4, "energised": True}, {"channel": 4, "manual": True, "port": 1}],
     "set_dip": [{"value": 5}], "set_faults": [{"faults": {"drop_rate": 0.5}}],
     "set_module": [{"name": "4do"}, {"name": "4do", "port": 1}],
@@ -53,7 +54,7 @@ class Recorder(Http):
         self.open(method, path)
         return {
             "boards": BOARDS, "endpoints": {}, "findings": {"findings": []},
-            "frames": {"frames": []}, "faults": {}, "openapi.json": {},
+            "frames": {"frames": []}, "faults": {}, "openapi.json": {}, "pdu": {"pdu": "0700"},
         }.get(path.partition("?")[0].rpartition("/")[2], STATE)
 
 

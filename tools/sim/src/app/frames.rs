@@ -83,7 +83,8 @@ pub fn summary(frame: &Frame) -> String {
     decode::frame(framing, frame.direction, &frame.bytes, request)
 }
 
-fn hex(bytes: &[u8]) -> String {
+/// Returns bytes in hexadecimal.
+pub fn hex(bytes: &[u8]) -> String {
     bytes
         .iter()
         .fold(String::with_capacity(2 * bytes.len()), |mut text, byte| {

@@ -328,7 +328,7 @@ fn radio(module: &radio::Module) -> Radio {
 
 /// Returns the unit address in force: that of the switch or, on a board without one, of register UNIT. `None` without
 /// power, and if the switch had no valid position at power-on.
-fn address(board: &Board) -> Option<u8> {
+pub fn address(board: &Board) -> Option<u8> {
     let address = match board.layout().switch {
         [] => {
             let unit = board.layout().stored(board.flash(), configuration::UNIT);

@@ -11,7 +11,7 @@ use register_map::{configuration, points};
 
 use super::read;
 use crate::cli::Config;
-use crate::device::{Device, fetch, with_modules};
+use crate::device::{Device, fetch_set, with_modules};
 use crate::failure::Failure;
 use crate::names::{Book, Item, is_module};
 use crate::output;
@@ -32,13 +32,7 @@ pub async fn run(
     json: bool,
     note: &Note,
 ) -> Result<(), Failure> {
-    let book = fetch(&mut device).await?.book;
-    let modules = device
-        .read_words(configuration::MODULE, points::PORTS)
-        .await?;
-    let set = |port: u8| modules.get(usize::from(port.max(1)) - 1).copied();
-    // Settings by point belong to the module that is set, which may not be in force yet.
-    let book = of_modules(&book, set)?;
+    let book = fetch_set(&mut device).await?;
     match options {
         Config::Get { names } => {
             let mut items = book.find_all(&names)?;

@@ -9,6 +9,7 @@ use ratatui::widgets::{Axis, Chart, Dataset, GraphType, Paragraph, Wrap};
 use tokio::time::Instant;
 
 use super::{OLD, STRONG, titled};
+use crate::links::{self, sentence};
 use crate::monitor::history::{SPAN, extent};
 use crate::monitor::link::ago;
 use crate::monitor::model::Model;
@@ -58,6 +59,11 @@ fn facts(frame: &mut Frame, model: &Model, item: &Item, area: Rect, now: Instant
         }
     };
     lines.push(Line::from(Span::styled(text, style)));
+    let mut links = links(model, item, now).peekable();
+    if links.peek().is_some() {
+        lines.push(Line::default());
+        lines.extend(links);
+    }
     if item.writable {
         lines.push(Line::default());
         lines.push(Line::from("Space switches it."));
@@ -67,6 +73,20 @@ fn facts(frame: &mut Frame, model: &Model, item: &Item, area: Rect, now: Instant
     }
     let facts = Paragraph::new(lines).wrap(Wrap { trim: true });
     frame.render_widget(facts.block(titled(&item.name, false)), area);
+}
+
+/// Iterates over the links to an output, or from an input, in words.
+fn links(model: &Model, point: &Item, now: Instant) -> impl Iterator<Item = Line<'static>> {
+    let links = links::all(&model.book).unwrap_or_default();
+    let own: Vec<_> = links::of(&model.book, &point.name).collect();
+    links.into_iter().filter_map(move |link| {
+        let (value, fresh) = model.counter(&link.name, now)?;
+        let is_from = value.words.first() == Some(&point.address);
+        let is_shown = links::acts(&value.words) && (own.contains(&link) || is_from);
+        let style = if fresh { Style::new() } else { OLD };
+        let text = sentence(&model.book, &link, &value.words);
+        is_shown.then(|| Line::from(Span::styled(text, style)))
+    })
 }
 
 fn chart(frame: &mut Frame, model: &Model, item: &Item, area: Rect, now: Instant) {

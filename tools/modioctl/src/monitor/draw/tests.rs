@@ -181,6 +181,27 @@ fn large_board_scrolls_and_a_large_terminal_shows_counters_beside_the_tree() {
 }
 
 #[test]
+fn links_are_shown_at_their_output_and_their_input() {
+    let now = Instant::now();
+    let mut model = model(Module::Do4, now);
+    let relays = Box::new(book(&MODIO_08, Module::Relay2, (0, 0)));
+    model.update(Update::Learned(relays), now);
+    let mut round = polled(now, &[]);
+    // The jumper p1.1 toggles the coil p1.3.
+    for (link, words) in [("1", [0, 3, 0, 0]), ("2", [0xFFFF, 0, 0, 0])] {
+        round
+            .words
+            .insert(format!("p1.3.link{link}"), words.to_vec());
+    }
+    model.update(Update::Polled(round), now);
+    for (row, count) in [(1, 1), (2, 0), (3, 1)] {
+        model.tree.select(row);
+        let text = screen(&mut model, 80, 24, now).join("\n");
+        assert_eq!(text.matches("p1.1 toggles p1.3").count(), count, "{text}");
+    }
+}
+
+#[test]
 fn terminal_of_any_size_is_drawn() {
     let now = Instant::now();
     let mut model = model(Module::Ai2Ao2, now);

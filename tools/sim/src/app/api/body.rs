@@ -14,6 +14,9 @@ use crate::app::faults::Faults;
 use crate::app::state::ModuleName;
 use crate::app::terminals::Applied;
 
+/// Length of the longest PDU in bytes (V1.1b3, 4.1).
+const LONGEST_PDU: usize = 253;
+
 type Body = Map<String, Value>;
 
 /// The body of `POST /api/dip`.
@@ -166,6 +169,24 @@ pub fn power(request: &Request) -> Result<Power, Reply> {
         ("cycle", value) => Ok(Power::Cycle(*value == Value::Bool(true))),
         (key, _) => Err(unknown(key, "`on` or `cycle`")),
     }
+}
+
+/// Returns the request to send to the unit.
+pub fn pdu(request: &Request) -> Result<Vec<u8>, Reply> {
+    match only(&body(request)?)? {
+        ("pdu", Value::String(digits)) => bytes(digits)
+            .ok_or_else(|| Reply::error(400, "`pdu` must be 1 to 253 bytes in hexadecimal")),
+        ("pdu", _) => Err(Reply::error(400, "`pdu` must be a string")),
+        (key, _) => Err(unknown(key, "`pdu`")),
+    }
+}
+
+fn bytes(digits: &str) -> Option<Vec<u8>> {
+    let (pairs, rest) = digits.as_bytes().as_chunks::<2>();
+    let digit = |digit: u8| char::from(digit).to_digit(16);
+    let byte = |[high, low]: &[u8; 2]| u8::try_from(digit(*high)? * 16 + digit(*low)?).ok();
+    let bytes: Vec<u8> = pairs.iter().map(byte).collect::<Option<_>>()?;
+    ((1..=LONGEST_PDU).contains(&bytes.len()) && rest.is_empty()).then_some(bytes)
 }
 
 /// Returns the module to plug in.

@@ -31,6 +31,7 @@ pub fn description() -> Description {
         super::outside::post_slot_module,
         super::outside::post_slot_channel,
         super::outside::post_terminal,
+        super::pdu::post,
         get_events,
     ),
     modifiers(&Replies)

@@ -9,6 +9,7 @@
 mod body;
 mod description;
 mod outside;
+mod pdu;
 
 use std::collections::BTreeMap;
 
@@ -130,6 +131,7 @@ fn of_path(
         "faults" if request.method == "GET" => Ok(get_faults(bench, n)),
         "faults" => post_faults(bench, n, request),
         "dip" => post_dip(bench, n, request),
+        "pdu" => pdu::post(bench, n, request),
         "power" => post_power(bench, n, request),
         _ => return outside::of_path(bench, n, request, path),
     })

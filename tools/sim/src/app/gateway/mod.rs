@@ -10,6 +10,7 @@
 //! unit, and passes the reply on. A frame with a wrong check, a damaged frame and a frame of another unit are no reply.
 //! Like a gateway on a real line, it does not wait for a free line: the frames of two masters at the same time collide.
 
+mod ask;
 mod client;
 mod exchange;
 mod mbap;
@@ -21,6 +22,7 @@ use std::sync::mpsc::{Sender, TryRecvError};
 
 use modbus_line::adu::Framing;
 
+pub use self::ask::ask;
 use self::client::{Client, Responses};
 use self::exchange::{Exchange, Outcome};
 use self::mbap::Request;

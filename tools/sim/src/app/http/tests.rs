@@ -89,7 +89,7 @@ fn page_loads_nothing_from_other_servers() {
         }
     }
     seen.sort();
-    // The first of the files is the page itself, and `/modules.js` is not one of them.
+    // The first of the files is the page itself, and `/map.js` is not one of them.
     assert_eq!(seen.len(), page::FILES.len(), "{seen:?}");
 }
 

@@ -1,7 +1,7 @@
 // The board: power, switch, LEDs, line, and the slots with their modules.
 
 import { pointName, slotsOf, terminals } from "/model.js";
-import { modules } from "/modules.js";
+import { modules } from "/map.js";
 import { post } from "/api.js";
 import { buildChannel, showChannel } from "/channels.js";
 import * as fixed from "/terminals.js";

@@ -81,6 +81,9 @@ export function address(port, number) {
   return `0x${((port - 1) * 4 + number - 1).toString(16).padStart(4, "0")}`;
 }
 
+/** Returns the name of a unit in UCUM, for people. */
+export const unitName = (code) => ({ Cel: "°C", uA: "µA" })[code] ?? code;
+
 /** Returns the bytes of a frame, with spaces between them. */
 export const spaced = (hex) => hex.match(/../g)?.join(" ") ?? "";
 

@@ -7,6 +7,7 @@ import * as chart from "/chart.js";
 import * as connect from "/connect.js";
 import * as faults from "/faults.js";
 import * as frames from "/frames.js";
+import * as links from "/links.js";
 import { byId, element, setText } from "/ui.js";
 
 const SAMPLE_MS = 250;
@@ -32,6 +33,7 @@ function take(state) {
 function show(state) {
   board.show(state);
   connect.show(state);
+  links.show(state);
 }
 
 /** Shows whether the simulator answers. Without it the board cannot be operated. */
@@ -87,6 +89,7 @@ function choose(name) {
   api.chooseBoard(name);
   board.forget();
   chart.reset();
+  links.forget();
   listen();
   faults.refresh();
 }
@@ -94,6 +97,7 @@ function choose(name) {
 api.onChange(take);
 board.listen();
 frames.listen();
+links.listen();
 setInterval(() => board.current() && chart.sample(board.current()), SAMPLE_MS);
 setInterval(poll, POLL_MS);
 faults.refresh();

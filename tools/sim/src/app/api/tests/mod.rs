@@ -89,6 +89,25 @@ fn change_that_the_channel_does_not_have_returns_409() {
 }
 
 #[test]
+fn request_to_the_unit_without_a_reply_returns_504_and_without_an_address_409() {
+    let mut bench = bench(Module::Di4);
+    let mut status = |body: &str| post(&mut bench, "/api/pdu", body).status;
+    assert_eq!(
+        status(r#"{"pdu":"0300100004"}"#),
+        504,
+        "no firmware replies"
+    );
+    let long = format!(r#"{{"pdu":"{}"}}"#, "07".repeat(254));
+    for body in [r#"{"pdu":""}"#, r#"{"pdu":"0"}"#, r#"{"pdu":"+7"}"#, &long] {
+        assert_eq!(status(body), 400, "{body}");
+    }
+    assert_eq!(state(&mut bench)["line"]["rx_frames"], 1);
+    post(&mut bench, "/api/power", r#"{"on":false}"#);
+    let off = post(&mut bench, "/api/pdu", r#"{"pdu":"07"}"#);
+    assert_eq!(off.status, 409);
+}
+
+#[test]
 fn power_dip_and_module_change_and_the_module_only_with_the_power_off() {
     let mut bench = bench(Module::Di4);
     assert_eq!(
