@@ -10,7 +10,7 @@ use In::{Ci, Host, Test};
 use Run::{Each, EachOfModio, Once};
 use anyhow::{Result, bail, ensure};
 use register_map::Board;
-use register_map::board::{MODIO_02, MODIO_08};
+use register_map::board::{FX3U_24, MODIO_02, MODIO_08};
 
 use crate::error::{missing, usage};
 use crate::python::{masters, page};
@@ -299,7 +299,7 @@ fn image(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
 }
 
 fn sim(workspace: &mut Workspace) -> Result<()> {
-    let tests = "--bin=modio-sim --test=command --test=image --test=image_08";
+    let tests = "--bin=modio-sim --test=command --test=image --test=image_08 --test=image_fx3u";
     simulated(workspace, tests, "", &[])
 }
 
@@ -369,6 +369,11 @@ pub fn simulated(
             "MODIO_UPDATE_08",
         ];
         files.extend(names.into_iter().zip(loaded(workspace, &MODIO_08)?));
+    }
+    if updates("--test=image_fx3u") {
+        let [loader, a, ..] = loaded(workspace, &FX3U_24)?;
+        files.extend([("MODIO_LOADER_FX3U", loader), ("MODIO_A_FX3U", a)]);
+        files.push(("MODIO_ELF_FX3U", build::image(workspace, &FX3U_24)?));
     }
     files.push(("MODIO_ELF", build::image(workspace, &MODIO_02)?));
     files.push(("MODIO_ELF_08", build::image(workspace, &MODIO_08)?));

@@ -7,9 +7,9 @@ use std::fs;
 
 use register_map::codes::LinkAction;
 use register_map::configuration::{FILTER, UNIT};
-use register_map::layout::FLASH_BASE;
 use register_map::links;
 use register_map::name::UNIT_BY_SERIAL;
+use register_map::part::FLASH_BASE;
 use register_map::state;
 use sim::board::terminals::Value;
 use sim::board::{FX3U_24, Layout};
@@ -60,7 +60,9 @@ fn words(bench: &mut Bench, first: u16, count: u8) -> Vec<u16> {
     let reply = bench.ask(1, &[3, high, low, 0, count]).expect("a reply");
     assert_eq!(reply[..2], [3, 2 * count], "{reply:02X?}");
     let words = reply[2..].chunks(2);
-    words.map(|word| u16::from_be_bytes([word[0], word[1]])).collect()
+    words
+        .map(|word| u16::from_be_bytes([word[0], word[1]]))
+        .collect()
 }
 
 #[test]
@@ -103,7 +105,11 @@ fn every_relay_is_at_its_point_and_missing_ones_are_exception_02() {
         assert_eq!(bench.ask(1, &[5, 0, point, 0xFF, 0]).unwrap(), [0x85, 2]);
         assert_eq!(bench.ask(1, &[1, 0, point, 0, 1]).unwrap(), [0x81, 2]);
     }
-    assert_eq!(bench.ask(1, &[6, 1, 0x10, 0, 1]).unwrap(), [0x86, 2], "MODULE");
+    assert_eq!(
+        bench.ask(1, &[6, 1, 0x10, 0, 1]).unwrap(),
+        [0x86, 2],
+        "MODULE"
+    );
 }
 
 #[test]
@@ -116,9 +122,15 @@ fn analog_inputs_measure_volts_and_milliamperes() {
         bench.board.run_for(Time::from_ms(1_500));
         let read = words(&mut bench, AD0.into(), 4);
         // 12 bits of 10 V or 20 mA. Five codes are the tolerance of the converter at its full scale.
-        for (code, part) in [(read[0], f64::from(volts) / 10e3), (read[3], f64::from(milliamperes) / 20e3)] {
+        for (code, part) in [
+            (read[0], f64::from(volts) / 10e3),
+            (read[3], f64::from(milliamperes) / 20e3),
+        ] {
             let expected = part * 4095.0;
-            assert!((f64::from(code) - expected).abs() <= 6.0, "{code} of {expected}");
+            assert!(
+                (f64::from(code) - expected).abs() <= 6.0,
+                "{code} of {expected}"
+            );
         }
         assert_eq!(read[1..3], [0, 0], "AD1 and AD2");
     }
@@ -136,14 +148,17 @@ fn analog_outputs_are_the_part_s_own_dac() {
             panic!("no output");
         };
         let expected = f64::from(code) / 4095.0 * 10_000.0;
-        assert!((f64::from(millivolts) - expected).abs() < 60.0, "{millivolts} mV of {expected}");
+        assert!(
+            (f64::from(millivolts) - expected).abs() < 60.0,
+            "{millivolts} mV of {expected}"
+        );
     }
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn line_stays_idle_from_power_on_to_the_first_reply() {
-    let mut flash = vec![0xFF; LAYOUT.part.flash as usize];
+    let mut flash = vec![0xFF; LAYOUT.part.flash_size as usize];
     let [slot, _] = LAYOUT.board.layout().slots;
     let image = fs::read(path(FILES[1])).expect("the image can be read");
     let at = (slot - FLASH_BASE) as usize;
@@ -159,7 +174,12 @@ fn line_stays_idle_from_power_on_to_the_first_reply() {
     let begin = bench.board.now();
     bench.board.run_for(Time::from_ms(4_500));
     // Until the first instructions of the loader the board's resistor switches the driver on, with an idle TX.
-    let on: Vec<_> = bench.board.line().driver_edges().filter(|(at, on)| *on && *at > begin + Time::from_us(100)).collect();
+    let on: Vec<_> = bench
+        .board
+        .line()
+        .driver_edges()
+        .filter(|(at, on)| *on && *at > begin + Time::from_us(100))
+        .collect();
     assert_eq!(on, [], "the driver was on");
     assert_eq!(bench.board.line().take_received(), []);
     let now = bench.board.now();
@@ -170,7 +190,7 @@ fn line_stays_idle_from_power_on_to_the_first_reply() {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn line_stays_idle_without_a_valid_image() {
-    let flash = vec![0xFF; LAYOUT.part.flash as usize];
+    let flash = vec![0xFF; LAYOUT.part.flash_size as usize];
     let loader = Image::read(&path(FILES[0])).expect("the loader can be read");
     let config = Config {
         chip: chip::Config::holding(flash),
@@ -181,7 +201,9 @@ fn line_stays_idle_without_a_valid_image() {
     let begin = bench.board.now();
     bench.board.run_for(Time::from_secs(5));
     let edges = bench.board.line().driver_edges();
-    let on: Vec<_> = edges.filter(|(at, on)| *on && *at > begin + Time::from_us(100)).collect();
+    let on: Vec<_> = edges
+        .filter(|(at, on)| *on && *at > begin + Time::from_us(100))
+        .collect();
     assert_eq!((on.len(), bench.board.driver_enable()), (0, false));
 }
 
@@ -195,10 +217,17 @@ fn address_is_set_by_serial_number_and_kept() {
     let request = [&[0xFD, 0x46, 8][..], &serial, &[6, high, low, 0, 42]].concat();
     let reply = bench.exchange(&bench::adu(&request));
     let expected = [&[0xFD, 0x46, 9][..], &serial, &[6, high, low, 0, 42]].concat();
-    assert_eq!(reply.get(reply.len().saturating_sub(15)..), Some(&bench::adu(&expected)[..]));
+    assert_eq!(
+        reply.get(reply.len().saturating_sub(15)..),
+        Some(&bench::adu(&expected)[..])
+    );
     bench.assert_answers(42);
     assert_eq!(bench.ask(1, &[2, 0, 0, 0, 1]), None);
-    assert_eq!(bench.ask(42, &[6, high, low, 0, 43]).unwrap(), [0x86, 2], "to the unit address");
+    assert_eq!(
+        bench.ask(42, &[6, high, low, 0, 43]).unwrap(),
+        [0x86, 2],
+        "to the unit address"
+    );
     bench.board.run_for(Time::from_ms(500));
     bench.board.cycle();
     bench.board.run_for(Time::from_ms(200));

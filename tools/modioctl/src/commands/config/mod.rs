@@ -7,7 +7,7 @@ use std::io::{IsTerminal, stdin};
 use std::path::Path;
 
 use register_map::codes::Command;
-use register_map::{configuration, points};
+use register_map::configuration;
 
 use super::read;
 use crate::cli::Config;
