@@ -119,7 +119,7 @@ class State:
     virtual_ms: int
     """Virtual time since the simulator was started."""
     board: str
-    """"modio-02" or "modio-08"."""
+    """Such as "modio-02"."""
     powered: bool
     dip: int
     """The DIP switch as a number."""
@@ -231,7 +231,7 @@ class BoardInfo:
     name: str
     """Name for `Simulator.board`."""
     board: str
-    """"modio-02" or "modio-08"."""
+    """Such as "modio-02"."""
     dip: int
     address: Optional[int]
     """The unit address in force, as in `State`."""

@@ -30,8 +30,9 @@ pub struct Options {
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub dip: u8,
 
-    /// Type of the board: modio-02 or modio-08
+    /// Type of the board
     #[arg(long, value_name = "NAME", default_value_t = &MODIO_02)]
+    #[arg(help = format!("Type of the board: {}", Board::ALL.map(|board| board.name).join(", ")))]
     pub board: &'static Board,
 
     /// Module in the board's first slot
