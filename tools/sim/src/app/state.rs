@@ -13,9 +13,6 @@ use super::bench::Bench;
 use super::faults::{Faults, HSI_HZ};
 use super::terminals::{self, Terminal};
 
-/// Value of register UNIT when none is stored.
-const UNIT: u8 = 1;
-
 /// The state of a board.
 #[derive(Serialize, ToSchema)]
 pub struct State {
@@ -332,7 +329,8 @@ pub fn address(board: &Board) -> Option<u8> {
     let address = match board.layout().switch {
         [] => {
             let unit = board.layout().stored(board.flash(), configuration::UNIT);
-            unit.map_or(UNIT, |unit| unit as u8)
+            // 1 is the default.
+            unit.map_or(1, |unit| unit as u8)
         }
         _ => board.dip_at_power_on(),
     };
