@@ -7,11 +7,23 @@ use std::ops::Range;
 
 use anyhow::{Context as _, Result, ensure};
 use object::{Object as _, ObjectSection as _, SectionKind};
+use register_map::Board;
 
 use super::{Elf, FLASH_BASE, RAM_BASE, Symbol, demangled};
 
-/// Addresses of flash in the largest part of the family.
-const FLASH: Range<u32> = FLASH_BASE..FLASH_BASE + 0x10_0000;
+/// Addresses of flash in the largest part that a board has. A larger range would also refuse constants that only look like
+/// addresses.
+const FLASH: Range<u32> = {
+    let (mut bytes, mut n) = (0, 0);
+    while n < Board::ALL.len() {
+        let part = Board::ALL[n].memory().part;
+        if part.flash > bytes {
+            bytes = part.flash;
+        }
+        n += 1;
+    }
+    FLASH_BASE..FLASH_BASE + bytes
+};
 
 /// Refuses code in RAM that contains an address in flash, or that calls or jumps to an address in a register, which may
 /// be in flash.
