@@ -5,7 +5,7 @@ use stm32f1xx_hal::pac;
 use crate::{
     boards::{BOARD, PortKind, SLOTS},
     fitted::{self, Fitted},
-    pin::Mode,
+    pin::{Mode, Pin},
 };
 
 /// EN and BOFF of both channels (RM0008 12.5.1). With its buffer an output does not reach 0 V.
@@ -25,6 +25,9 @@ impl OwnDac {
         rcc.apb1enr().modify(|_, w| w.dacen().set_bit());
         rcc.apb1rstr().modify(|_, w| w.dacrst().set_bit());
         rcc.apb1rstr().modify(|_, w| w.dacrst().clear_bit());
+        // The pins must not load the outputs with their digital inputs (RM0008 12.3.1).
+        Pin::a(4).configure(Mode::Analog);
+        Pin::a(5).configure(Mode::Analog);
         Some(Self {
             dac,
             _fitted: proof,
@@ -59,8 +62,6 @@ impl OwnDac {
                 }
                 None => continue,
             }
-            // The pin must not load the output with its digital input (RM0008 12.3.1).
-            pin.configure(Mode::Analog);
         }
         // SAFETY: sets defined bits. Without a trigger a code reaches the output after one cycle of APB1.
         self.dac.cr().write(|w| unsafe { w.bits(ON) });
