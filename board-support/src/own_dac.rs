@@ -3,7 +3,7 @@
 use stm32f1xx_hal::pac;
 
 use crate::{
-    boards::{BOARD, PortKind, SLOTS},
+    boards::{BOARD, PortKind},
     fitted::{self, Fitted},
     pin::{Mode, Pin},
 };
@@ -36,7 +36,7 @@ impl OwnDac {
 
     /// Drives the outputs of a port with these codes of its channels. The first call turns the DAC on.
     pub fn write(&mut self, slot: usize, codes: [u16; 4]) {
-        let Some(slot) = BOARD.slots.get(slot % SLOTS) else {
+        let Some(slot) = BOARD.slots.get(slot) else {
             return;
         };
         let lines = match slot.kind {

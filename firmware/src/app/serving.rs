@@ -148,7 +148,9 @@ impl Serving {
         if let Some(unit) = device.lock(|device| device.take_unit())
             && let Some(units) = line::units(Some(unit), fast)
         {
-            self.unit.as_mut().map(|fast| fast.set_address(unit));
+            if let Some(fast) = &mut self.unit {
+                fast.set_address(unit);
+            }
             rs485.lock(|line| line.as_mut().map(|line| line.set_units(units)));
         }
     }

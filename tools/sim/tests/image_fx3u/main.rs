@@ -184,7 +184,7 @@ fn assert_idle(bench: &mut Bench, time: Time) {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn line_stays_idle_from_power_on_to_the_first_reply() {
-    let mut flash = vec![0xFF; LAYOUT.part.flash_size as usize];
+    let mut flash = vec![0xFF; LAYOUT.part.flash_size];
     let [slot, _] = LAYOUT.board.layout().slots;
     let image = fs::read(path(FILES[1])).expect("the image can be read");
     let at = (slot - FLASH_BASE) as usize;
@@ -204,7 +204,7 @@ fn line_stays_idle_from_power_on_to_the_first_reply() {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn line_stays_idle_without_a_valid_image() {
-    let flash = vec![0xFF; LAYOUT.part.flash_size as usize];
+    let flash = vec![0xFF; LAYOUT.part.flash_size];
     let loader = Image::read(&path(FILES[0])).expect("the loader can be read");
     let config = Config {
         chip: chip::Config::holding(flash),
