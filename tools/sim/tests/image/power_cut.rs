@@ -26,7 +26,7 @@ const TRIES: usize = 2;
 /// A save takes 2 ms. A save that has to erase takes 30 ms more, during which the unit does not serve the line.
 const SAVE: Time = Time::from_ms(60);
 /// Time after which a save that only programs half-words has ended. A save that also erases takes longer.
-const PLAIN_SAVE: Time = Time::from_ms(6);
+const PLAIN_SAVE: Time = Time::from_ms(8);
 /// Number of starts after a cut. Unstable cells read differently at each start.
 const STARTS: usize = 2;
 
