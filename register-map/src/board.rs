@@ -73,6 +73,15 @@ struct Row {
     memory: Memory,
 }
 
+/// The memory of both clones of the FX3U.
+const FX3U: Memory = Memory {
+    part: STM32F103VC,
+    smaller: None,
+    stack: 11 * KIB,
+    budget: [68 * KIB, 20 * KIB],
+    interrupts: ["UART4", "USART1", "EXTI3"],
+};
+
 const ROWS: [Row; 5] = [
     // The LLD-ModbusIO-02 with an STM32F103CB, or a C8 on a "Blue Pill": one slot, port 5.
     Row {
@@ -128,13 +137,7 @@ const ROWS: [Row; 5] = [
         ],
         switch: false,
         radio: false,
-        memory: Memory {
-            part: STM32F103VC,
-            smaller: None,
-            stack: 11 * KIB,
-            budget: [68 * KIB, 20 * KIB],
-            interrupts: ["UART4", "USART1", "EXTI3"],
-        },
+        memory: FX3U,
     },
     // The FX3U-24MR's clone: an STM32F103VC.
     Row {
@@ -157,13 +160,7 @@ const ROWS: [Row; 5] = [
         ],
         switch: false,
         radio: false,
-        memory: Memory {
-            part: STM32F103VC,
-            smaller: None,
-            stack: 11 * KIB,
-            budget: [68 * KIB, 20 * KIB],
-            interrupts: ["UART4", "USART1", "EXTI3"],
-        },
+        memory: FX3U,
     },
     // The "eth_modbus_io5r": an STM32F103CB.
     Row {

@@ -2,6 +2,7 @@
 
 use crate::Module;
 use crate::kind::Kind;
+use crate::points::CHANNELS;
 
 /// A port without slot. Its MODULE is what its inputs and outputs are like, and can only be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,6 +38,12 @@ impl FixedPort {
     pub(crate) const fn currents(mut self, channels: u8) -> Self {
         self.currents = channels;
         self
+    }
+
+    /// Returns the number of the module's channels that the port does not have.
+    #[must_use]
+    pub const fn lacks(&self) -> u8 {
+        CHANNELS as u8 - self.channels
     }
 
     /// Returns whether MODULE may have this value.

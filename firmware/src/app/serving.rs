@@ -132,9 +132,7 @@ impl Serving {
             }
         }
     }
-}
 
-impl Serving {
     /// Puts the unit address in force that a request has set, if any. The other line keeps its address until the restart.
     fn change_address(
         &mut self,

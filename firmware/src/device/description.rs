@@ -15,7 +15,7 @@
 use core::{array, slice};
 
 use modbus_server::{Exception, Span, WordsOut, crc};
-use register_map::Board;
+use register_map::{Board, FixedPort};
 
 use crate::HAS_SLOTS;
 use crate::config::Config;
@@ -133,7 +133,7 @@ fn ports<const SLOTS: usize>(config: &Config<SLOTS>) -> [[u8; PORT_BYTES]; SLOTS
         let module = modules.get(index).map_or(0, |module| module.code());
         let port = first.wrapping_add(index as u16);
         let fixed = config.board().fixed(port).filter(|_| !HAS_SLOTS);
-        let lacks = fixed.map_or(0, |port| 4 - port.channels);
+        let lacks = fixed.map_or(0, FixedPort::lacks);
         [port as u8, lacks, module as u8]
     })
 }

@@ -1,7 +1,6 @@
 //! Runs the links: inputs that switch outputs without a master.
 
 use modio_drivers::{CHANNELS, Kind};
-
 use register_map::links;
 
 use super::Device;

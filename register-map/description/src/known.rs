@@ -2,7 +2,7 @@
 
 use register_map::points::{self, Kind};
 use register_map::state::MAP_VERSION_VALUE;
-use register_map::{Access, Board, InForce, Module, Rule, Text, configuration, state};
+use register_map::{Access, Board, FixedPort, InForce, Module, Rule, Text, configuration, state};
 
 use crate::{
     Description, Field, ModuleType, Narrower, PointKind, Port, Reading, Register, Scope, Table,
@@ -37,7 +37,7 @@ pub fn describe(board: &Board, firmware: &str, module: impl Fn(u16) -> Module) -
             .map(|number| Port {
                 number: number as u8,
                 module: module(number).code(),
-                lacks: board.fixed(number).map_or(0, |port| 4 - port.channels),
+                lacks: board.fixed(number).map_or(0, FixedPort::lacks),
             })
             .collect(),
     }

@@ -155,6 +155,19 @@ fn analog_outputs_are_the_part_s_own_dac() {
     }
 }
 
+/// Returns a board that was powered just now, with the loader in front of these bytes.
+fn loaded(flash: Vec<u8>) -> Bench {
+    let loader = Image::read(&path(FILES[0])).expect("the loader can be read");
+    let config = Config {
+        chip: chip::Config::holding(flash),
+        ..Config::default()
+    };
+    let mut bench = Bench::of(&loader, config);
+    // The loader's reset after the check of an image.
+    bench.tolerant = true;
+    bench
+}
+
 /// Runs a board that was powered just now, and asserts that its line stays idle. While the part is in reset, for up to 4.5 ms
 /// after power-on (DS5792 table 11), and until the first instructions of the loader, the board's resistor switches the driver
 /// on, with an idle TX.
@@ -189,14 +202,7 @@ fn line_stays_idle_from_power_on_to_the_first_reply() {
     let image = fs::read(path(FILES[1])).expect("the image can be read");
     let at = (slot - FLASH_BASE) as usize;
     flash[at..at + image.len()].copy_from_slice(&image);
-    let loader = Image::read(&path(FILES[0])).expect("the loader can be read");
-    let config = Config {
-        chip: chip::Config::holding(flash),
-        ..Config::default()
-    };
-    let mut bench = Bench::of(&loader, config);
-    // The loader's reset after the check of the image.
-    bench.tolerant = true;
+    let mut bench = loaded(flash);
     assert_idle(&mut bench, Time::from_ms(4_500));
     assert_eq!(bench.ask(1, &[2, 0, 0, 0, 1]).unwrap(), [2, 1, 0]);
 }
@@ -205,13 +211,7 @@ fn line_stays_idle_from_power_on_to_the_first_reply() {
 #[ignore = "needs the image: cargo xtask test"]
 fn line_stays_idle_without_a_valid_image() {
     let flash = vec![0xFF; LAYOUT.part.flash_size];
-    let loader = Image::read(&path(FILES[0])).expect("the loader can be read");
-    let config = Config {
-        chip: chip::Config::holding(flash),
-        ..Config::default()
-    };
-    let mut bench = Bench::of(&loader, config);
-    bench.tolerant = true;
+    let mut bench = loaded(flash);
     assert_idle(&mut bench, Time::from_secs(5));
 }
 
