@@ -2,6 +2,7 @@
 
 import re
 import shutil
+import time
 import unittest
 from urllib.parse import urlsplit
 
@@ -98,10 +99,11 @@ class OnPage(unittest.TestCase):
         self.assertFalse(answer.isError(), answer)
         return answer
 
-    def eventually(self, what, wanted, within_ms: int = 1000):
-        """Waits until `what()` returns `wanted`, for this much of the board's virtual time."""
-        end = self.simulator.state().virtual_ms + within_ms
-        while (seen := what()) != wanted and self.simulator.state().virtual_ms < end:
+    def eventually(self, what, wanted):
+        """Waits until `what()` returns `wanted`. The limit is one of real time: requests of the test let the board's time
+        run ahead of the browser."""
+        end = time.monotonic() + PATIENCE
+        while (seen := what()) != wanted and time.monotonic() < end:
             # This also lets the page's requests pass, which run through this process.
             self.page.wait_for_timeout(5)
         self.assertEqual(seen, wanted)

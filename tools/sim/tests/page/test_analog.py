@@ -108,7 +108,7 @@ class Analog(OnPage):
         expect(self.page.locator("#legend span")).to_have_text(
             [re.compile("^p5.1: "), re.compile("^p5.2: "), re.compile("^p5.3: "), re.compile("^p5.4: 5.00 V$")])
         last = lambda n: self.page.locator("#lines polyline").nth(n).get_attribute("points").split()[-1]
-        self.eventually(lambda: last(3), "600.0,75.0", 5000)
+        self.eventually(lambda: last(3), "600.0,75.0")
         self.simulator.set_channel(1, millivolts=3300)
-        self.eventually(lambda: last(0), "600.0,0.0", 5000)
+        self.eventually(lambda: last(0), "600.0,0.0")
         expect(self.page.locator("#lines polyline")).to_have_count(4)
