@@ -14,7 +14,7 @@ use stm32f1xx_hal::pac;
 
 use crate::{pin::Pin, vectors};
 
-/// The count at the last edge, and whether there was one since the last [`Edge::clear`].
+/// The count at the last edge, and whether there was one since the last was forgotten.
 static COUNT: AtomicU16 = AtomicU16::new(0);
 static FELL: AtomicBool = AtomicBool::new(false);
 
@@ -86,10 +86,16 @@ impl Edge {
         }
     }
 
-    /// Forgets that there was an edge.
+    /// Forgets that there was an edge, also one that waits.
     #[inline(always)]
     pub(crate) fn clear(self) {
         self.acknowledge();
+        self.forget_taken();
+    }
+
+    /// Forgets the edge that was taken last. One that waits stays.
+    #[inline(always)]
+    pub(crate) fn forget_taken(self) {
         FELL.store(false, Ordering::Relaxed);
     }
 
@@ -101,7 +107,7 @@ impl Edge {
             .write(|w| unsafe { w.bits(self.bit()) });
     }
 
-    /// Returns whether there was an edge since the last [`Self::clear`].
+    /// Returns whether there was an edge since the last was forgotten.
     #[inline(always)]
     pub(crate) fn fell(self) -> bool {
         self.take();

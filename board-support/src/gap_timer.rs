@@ -230,7 +230,7 @@ impl GapTimer for Rs485Timer {
         let fell = self.has_fallen().then(|| self.last_edge());
         // Reading the captured count has cleared its flag (RM0008 14.4.5).
         if let Some(edge) = EDGE {
-            edge.clear();
+            edge.forget_taken();
         }
         fell
     }

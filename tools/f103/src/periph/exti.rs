@@ -32,6 +32,12 @@ impl Exti {
         self.rtsr | self.ftsr != 0
     }
 
+    /// Returns whether a line detects edges.
+    #[must_use]
+    pub fn detects(&self, line: usize) -> bool {
+        (self.rtsr | self.ftsr) >> line & 1 != 0
+    }
+
     /// Returns the lines that request an interrupt, one bit each.
     #[must_use]
     pub fn requests(&self) -> u32 {

@@ -110,14 +110,30 @@ impl<C: Circuit> Soc<C> {
         if self.circuit.pins_changed() {
             self.refresh(now);
         }
+        if self.has_interrupt(serial) {
+            self.drive_rx(serial, now);
+        }
         self.note_requests(serial.usart);
         self.note_due(serial.usart);
     }
 
+    /// Returns whether edges of the RX pin reach EXTI.
+    fn has_interrupt(&self, serial: &Serial) -> bool {
+        let line = serial.rx.number();
+        self.exti.detects(line) && self.afio.exti_port(line) == serial.rx.port_index()
+    }
+
     /// Returns the instant of the next event in a USART or at its RX pin.
     pub(super) fn next_exchange(&mut self, serial: &Serial) -> Option<Time> {
+        let has_interrupt = self.has_interrupt(serial);
         match self.connection(serial) {
-            (usart, Some(wire)) => usart.next_exchange(wire),
+            (usart, Some(wire)) => {
+                let edge = wire.next_edge().filter(|_| has_interrupt);
+                [usart.next_exchange(wire), edge]
+                    .into_iter()
+                    .flatten()
+                    .min()
+            }
             (usart, None) => usart.next_event(),
         }
     }

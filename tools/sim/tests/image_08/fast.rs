@@ -2,79 +2,22 @@
 
 use register_map::codes::Baud;
 use register_map::configuration::{BAUD, FORMAT};
-use sim::line::Settings;
-use sim::{Board, Bus, Config, Module, Time};
+use sim::{Board, Config, Module, Time};
 
 use crate::LAYOUT;
-use crate::bench::{FIRST, PORT, adu, config, corner, crc, format, image};
-
-/// A bus with a master that knows function 70.
-struct Master {
-    bus: Bus,
-    settings: Settings,
-}
+use crate::bench::{FIRST, PORT, config, corner, image};
+use crate::fast_master::Master;
 
 /// A unit: its switch and the error of its crystal in ppm; `None` without a crystal.
 type Unit = (u8, Option<i32>);
 
-impl Master {
-    /// Returns a bus with these units, with time to start.
-    fn new(baud: Baud, format_code: u16, units: &[Unit]) -> Self {
-        let boards = units.iter().zip(0..).map(|(unit, n)| {
-            let stored = [(BAUD, baud.code()), (FORMAT, format_code)];
-            board(*unit, n, &stored)
-        });
-        let mut bus = Bus::new(boards.collect());
-        let settings = Settings {
-            baud: baud.bits_per_second(),
-            format: format(format_code),
-        };
-        bus.line().set_settings(settings);
-        bus.run_for(Time::from_ms(300));
-        Self { bus, settings }
-    }
-
-    /// Sends a request without its CRC. Returns the reply without its CRC, and what was received in front of it.
-    fn ask(&mut self, request: &[u8], windows: u64) -> Option<(Vec<u8>, Vec<u8>)> {
-        let now = self.bus.now();
-        let end = self.bus.line().send(now, &adu(request));
-        let bits = |n| self.settings.rate().bits(n);
-        let window = bits(13) + Time::from_us(50);
-        let start = bits(39).max(bits(12) + Time::from_us(800));
-        let arbitration = start + Time::from_ps(window.as_ps() * windows);
-        let reply = self.settings.characters(72) + Time::from_ms(2);
-        self.bus.run_until(end + arbitration + reply);
-        let received = self.bus.line().take_received();
-        let bytes: Vec<u8> = received.iter().map(|received| received.byte).collect();
-        // The reply is the shortest end of what was received with a valid CRC.
-        let at = (0..bytes.len().checked_sub(4)?).rev().find(|at| {
-            let (body, sum) = bytes[*at..].split_at(bytes.len() - at - 2);
-            crc(body) == sum
-        })?;
-        Some((bytes[at..bytes.len() - 2].to_vec(), bytes[..at].to_vec()))
-    }
-
-    fn scan(&mut self, start: bool) -> Option<Vec<u8>> {
-        let request = [0xFD, 0x46, if start { 1 } else { 2 }];
-        self.ask(&request, 32).map(|(reply, _)| reply)
-    }
-
-    /// Scans the bus. Returns the serial numbers and addresses in the order in which they were found.
-    fn find_all(&mut self) -> Vec<(u32, u8)> {
-        let mut found = Vec::new();
-        let mut reply = self.scan(true).expect("a reply");
-        while let [0xFD, 0x46, 3, a, b, c, d, unit] = reply[..] {
-            found.push((u32::from_be_bytes([a, b, c, d]), unit));
-            reply = self.scan(false).expect("a reply");
-        }
-        assert_eq!(reply, [0xFD, 0x46, 4]);
-        found
-    }
-
-    fn fetch(&mut self, confirmed: u8, flag: u8) -> Vec<u8> {
-        let request = [0xFD, 0x46, 0x10, 0, 100, confirmed, flag];
-        self.ask(&request, 12).expect("a reply").0
-    }
+/// Returns a master with these units.
+fn master(baud: Baud, format_code: u16, units: &[Unit]) -> Master {
+    let boards = units.iter().zip(0..).map(|(unit, n)| {
+        let stored = [(BAUD, baud.code()), (FORMAT, format_code)];
+        board(*unit, n, &stored)
+    });
+    Master::new(baud, format_code, boards.collect())
 }
 
 fn board((dip, ppm): Unit, n: u8, stored: &[(u16, u16)]) -> Board {
@@ -111,7 +54,7 @@ fn a_scan_finds_every_unit_once_also_two_with_one_address() {
         (Baud::B921600, 0),
         (Baud::B921600, 1),
     ] {
-        let mut master = Master::new(baud, format, &units);
+        let mut master = master(baud, format, &units);
         let found = master.find_all();
         let mut sorted = found.clone();
         sorted.sort_unstable();
@@ -181,7 +124,7 @@ fn events_come_from_the_unit_that_has_them_high_ones_first() {
     // The last one has no crystal: it takes no part, and does not disturb the others.
     let units = [(1, Some(-200)), (2, Some(200)), (247, Some(0)), (3, None)];
     for (baud, format) in [(Baud::B9600, 0), (Baud::B115200, 1), (Baud::B921600, 0)] {
-        let mut master = Master::new(baud, format, &units);
+        let mut master = master(baud, format, &units);
         // Each unit reports its start first.
         assert_eq!(master.fetch(0, 0), [1, 0x46, 0x11, 0, 1, 4, 0, 0x0F, 0, 0]);
         for (unit, setting) in [(1, 1), (2, 2), (247, 1), (3, 2)] {

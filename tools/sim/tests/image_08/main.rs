@@ -36,6 +36,8 @@ mod boot;
 mod campaign;
 #[path = "../image/edges.rs"]
 mod edges;
+#[path = "../image/fast_master.rs"]
+mod fast_master;
 #[allow(dead_code, reason = "other tests of the modio-02 use the rest")]
 #[path = "../image/in_slots.rs"]
 mod in_slots;

@@ -5,15 +5,15 @@
 
 use std::fs;
 
-use register_map::codes::LinkAction;
-use register_map::configuration::{FILTER, UNIT};
+use register_map::codes::{Baud, LinkAction};
+use register_map::configuration::{BAUD, FILTER, UNIT};
 use register_map::links;
 use register_map::name::UNIT_BY_SERIAL;
 use register_map::part::FLASH_BASE;
 use register_map::state;
 use sim::board::terminals::Value;
 use sim::board::{FX3U_24, Layout};
-use sim::{Config, Image, Time, chip};
+use sim::{Board, Config, Image, Time, chip};
 
 /// The board that the image is for.
 const LAYOUT: &Layout = &FX3U_24;
@@ -25,8 +25,12 @@ const FILES: [&str; 2] = ["MODIO_LOADER_FX3U", "MODIO_A_FX3U"];
 #[allow(dead_code, reason = "tests of other boards use the rest")]
 #[path = "../image/bench.rs"]
 mod bench;
+#[allow(dead_code, reason = "the tests of the modio-08 use the rest")]
+#[path = "../image/fast_master.rs"]
+mod fast_master;
 
-use bench::{Bench, path};
+use bench::{Bench, corner, image, path};
+use fast_master::Master;
 
 /// Points of the first channel of ports 5, 7 and 8.
 const Y0: u8 = 16;
@@ -267,6 +271,27 @@ fn button_switches_a_lamp_without_a_master() {
             set(&mut bench, "X0", Value::Input(pressed));
             bench.board.run_for(Time::from_ms(20));
             assert_eq!(relay(&bench, "Y0"), lit);
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn scan_finds_units_whose_start_bits_are_seen_by_an_interrupt() {
+    for baud in [Baud::B9600, Baud::B115200, Baud::B921600] {
+        let units = [200, -200, 0].into_iter().zip(0..).map(|(ppm, n)| {
+            let mut config = board(&[(BAUD, baud.code())]);
+            config.layout = LAYOUT;
+            config.chip.corner = corner();
+            config.chip.unique_id[11] = n;
+            config.chip.crystal_hz = (8_000_000 + 8 * ppm) as u32;
+            Board::new(image(), config).expect("the image fits")
+        });
+        let mut master = Master::new(baud, 0, units.collect());
+        for _ in 0..5 {
+            let found = master.find_all();
+            let units: Vec<u8> = found.iter().map(|(_, unit)| *unit).collect();
+            assert_eq!(units, [1, 1, 1], "{baud:?}");
         }
     }
 }
