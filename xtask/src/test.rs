@@ -10,7 +10,7 @@ use In::{Ci, Host, Test};
 use Run::{Each, EachOfModio, Once};
 use anyhow::{Result, bail, ensure};
 use register_map::Board;
-use register_map::board::{FX3U_24, MODIO_02, MODIO_08};
+use register_map::board::{ETH_IO5R, FX3U_24, MODIO_02, MODIO_08};
 
 use crate::error::{missing, usage};
 use crate::python::{masters, page};
@@ -335,7 +335,8 @@ fn sim_fast(workspace: &mut Workspace) -> Result<()> {
 fn sim_at(workspace: &mut Workspace, corner: &str) -> Result<()> {
     let corner = [(CORNER, corner)];
     simulated(workspace, "--test=image", AT_CORNERS, &corner)?;
-    simulated(workspace, "--test=image_08", AT_CORNERS_08, &corner)
+    simulated(workspace, "--test=image_08", AT_CORNERS_08, &corner)?;
+    simulated(workspace, "--test=image_fx3u", "", &corner)
 }
 
 /// Builds the loader of a board, the signed images for slots A and B, and the file of an update, and returns their paths.
@@ -356,12 +357,12 @@ pub fn simulated(
 ) -> Result<()> {
     let ordinary = ordinary::words()?;
     let mut files = Vec::new();
-    let updates = |of: &str| targets.split(' ').any(|target| target == of);
-    if updates("--test=image") || updates("--test=simulator") {
+    let runs = |of: &str| targets.split(' ').any(|target| target == of);
+    if runs("--test=image") || runs("--test=simulator") {
         let names = ["MODIO_LOADER", "MODIO_A", "MODIO_B", "MODIO_UPDATE"];
         files.extend(names.into_iter().zip(loaded(workspace, &MODIO_02)?));
     }
-    if updates("--test=image_08") {
+    if runs("--test=image_08") {
         let names = [
             "MODIO_LOADER_08",
             "MODIO_A_08",
@@ -370,11 +371,14 @@ pub fn simulated(
         ];
         files.extend(names.into_iter().zip(loaded(workspace, &MODIO_08)?));
     }
-    if updates("--test=image_fx3u") {
+    if runs("--test=image_fx3u") {
         let [loader, a, ..] = loaded(workspace, &FX3U_24)?;
         files.extend([("MODIO_LOADER_FX3U", loader), ("MODIO_A_FX3U", a)]);
-        files.push(("MODIO_ELF_FX3U", build::image(workspace, &FX3U_24)?));
     }
+    if runs("--test=suite") {
+        files.push(("MODIO_ELF_IO5R", build::image(workspace, &ETH_IO5R)?));
+    }
+    files.push(("MODIO_ELF_FX3U", build::image(workspace, &FX3U_24)?));
     files.push(("MODIO_ELF", build::image(workspace, &MODIO_02)?));
     files.push(("MODIO_ELF_08", build::image(workspace, &MODIO_08)?));
     let simulator = workspace.simulator()?;
@@ -386,7 +390,7 @@ pub fn simulated(
             cargo.args(["--config", &runner]);
         }
         cargo.arg("--no-fail-fast").args(targets.split(' '));
-        cargo.args(["--", "--include-ignored"]).args(list);
+        cargo.args(["--", "--ignored"]).args(list);
         cargo.args(names.split_whitespace());
         cargo.env(CORNER, "nominal").envs(variables.iter().copied());
         cargo.envs(files.iter().map(|(name, file)| (name, file)));

@@ -22,14 +22,15 @@ use conformance::report::table;
 use conformance::run::{Outcome, Verdict, run};
 use modbus_line::LineFormat;
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
-use register_map::board::{MODIO_02, MODIO_08};
+use register_map::board::{ETH_IO5R, FX3U_24, MODIO_02, MODIO_08};
 use register_map::{Board, Module, configuration};
 
 fn elf(board: &Board) -> PathBuf {
-    let name = if *board == MODIO_02 {
-        "MODIO_ELF"
-    } else {
-        "MODIO_ELF_08"
+    let name = match board.name {
+        "modio-02" => "MODIO_ELF",
+        "modio-08" => "MODIO_ELF_08",
+        "eth-io5r" => "MODIO_ELF_IO5R",
+        _ => "MODIO_ELF_FX3U",
     };
     let elf = env::var_os(name);
     PathBuf::from(elf.unwrap_or_else(|| panic!("{name}: cargo xtask test sets it")))
@@ -225,5 +226,7 @@ boards_conform! {
         modio_08([Module::Di4, Module::Do4, Module::Ai4, Module::Ao4]), all(), 200;
     a_modio_08_with_empty_slots_between_modules_conforms:
         modio_08([Module::None, Module::Relay2, Module::None, Module::Ai2Ao2]), named(&OF_POINTS), 40;
+    an_fx3u_24_conforms: Fitting::new(elf(&FX3U_24), &FX3U_24), all(), 200;
+    an_eth_io5r_conforms: Fitting::new(elf(&ETH_IO5R), &ETH_IO5R), all(), 200;
     a_modio_08_with_sixteen_analog_outputs_conforms: modio_08([Module::Ao4; 4]), named(&OF_POINTS), 40;
 }

@@ -1,7 +1,5 @@
 //! `modioctl`'s plan of an update on a line with several boards, in virtual time.
 
-use std::env;
-
 use modioctl::update::{Campaign, File, Patience, Stage, Step, Unit};
 use register_map::codes::Baud;
 use register_map::configuration::BAUD;
@@ -14,7 +12,7 @@ use crate::bench::{FIRST, adu, path};
 use crate::in_slots::{CHECK, START, flash, image, made};
 
 /// A line with boards that run from slot A.
-struct Line {
+pub struct Line {
     bus: Bus,
     units: u8,
     settings: Settings,
@@ -23,19 +21,19 @@ struct Line {
     /// State of the generator of the errors.
     noise: u64,
     /// Each unit is asked for its points once a second.
-    polls: bool,
+    pub polls: bool,
     due: Time,
     /// Polls, and those without an answer.
-    polled: [u32; 2],
+    pub polled: [u32; 2],
     /// Beginning of the first block, end of the last one.
     blocks: Option<(Time, Time)>,
     last: Time,
     /// After this number of blocks the first board loses its supply for a moment.
-    cut_after: Option<usize>,
+    pub cut_after: Option<usize>,
 }
 
 impl Line {
-    fn new(baud: Baud, units: u8) -> Self {
+    pub fn new(baud: Baud, units: u8) -> Self {
         let boards = (1..=units).map(|unit| {
             let stored = [(BAUD, baud.code())];
             made(
@@ -179,7 +177,7 @@ impl Line {
     }
 
     /// Updates all units. Returns the time of the blocks as a multiple of that of the image's bytes.
-    fn update(&mut self) -> f64 {
+    pub fn update(&mut self) -> f64 {
         let file = std::fs::read(path(FILES[3]));
         let file = File::of(&file.expect("the file of the update")).expect("it is whole");
         let image = file.image(Slot::B);
@@ -213,25 +211,6 @@ impl Line {
     }
 }
 
-/// `MODIO_UNITS` is the number of units, 2 without it.
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn a_bus_is_updated_while_its_points_are_polled() {
-    let units = env::var("MODIO_UNITS").map_or(2, |units| units.parse().unwrap());
-    let mut bus = Line::new(Baud::B115200, units);
-    if units > 2 {
-        // Undisturbed first.
-        assert!(bus.update() < 1.3);
-        bus = Line::new(Baud::B115200, units);
-    }
-    bus.polls = true;
-    bus.update();
-    let [polls, lost] = bus.polled;
-    // Each unit is silent for some seconds, while it restarts.
-    let units = u32::from(units);
-    assert!(polls > 5 * units && lost <= 5 * units, "{polls} {lost}");
-}
-
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn bit_errors_delay_an_update_and_do_not_stop_it() {
@@ -239,13 +218,4 @@ fn bit_errors_delay_an_update_and_do_not_stop_it() {
     line.errors = 10_000;
     let ratio = line.update();
     assert!(ratio < 2.0, "{ratio}");
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn a_unit_that_loses_its_supply_in_an_update_begins_again() {
-    let mut line = Line::new(Baud::B115200, 2);
-    line.cut_after = Some(200);
-    let ratio = line.update();
-    assert!(ratio < 4.0, "{ratio}");
 }

@@ -35,6 +35,7 @@ mod bench;
 mod boot;
 mod bus;
 mod campaign;
+mod campaigns;
 mod clock;
 mod comm_watchdog;
 mod cores;

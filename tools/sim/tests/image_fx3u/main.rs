@@ -28,6 +28,8 @@ mod bench;
 #[allow(dead_code, reason = "the tests of the modio-08 use the rest")]
 #[path = "../image/fast_master.rs"]
 mod fast_master;
+#[path = "../image/timing.rs"]
+mod timing;
 
 use bench::{Bench, corner, image, path};
 use fast_master::Master;
@@ -136,7 +138,7 @@ fn analog_inputs_measure_volts_and_milliamperes() {
                 "{code} of {expected}"
             );
         }
-        assert_eq!(read[1..3], [0, 0], "AD1 and AD2");
+        assert!(read[1].max(read[2]) <= 6, "AD1 and AD2: {read:?}");
     }
 }
 
