@@ -1,6 +1,6 @@
 //! A request between its port and its reply, and the reply. Each owns the buffer.
 
-use crate::line::Framing;
+use crate::line::{Ending, Framing};
 use crate::{Adu, Exception, LineCounters};
 
 /// A valid request to this unit, or a broadcast, from [`Port::take`](crate::line::Port::take).
@@ -13,8 +13,8 @@ pub struct Request<'a> {
     pub(crate) line: LineCounters,
     /// Tick in which the request ended.
     pub(crate) ended: u32,
-    /// The unit has won the last arbitration on this line.
-    pub(crate) won: bool,
+    /// How the unit's last arbitration on this line has ended.
+    pub(crate) ending: Ending,
 }
 
 impl Request<'_> {

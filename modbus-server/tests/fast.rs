@@ -101,8 +101,12 @@ enum Answer {
 
 impl Unit {
     fn new(part: Part) -> Self {
+        Self::at(ADDRESS, part)
+    }
+
+    fn at(address: u8, part: Part) -> Self {
         let units = FastUnit {
-            unit: ADDRESS,
+            unit: address,
             is_fast: true,
         };
         let adus = Box::leak(Box::new([Adu::new(), Adu::new()]));
@@ -111,7 +115,7 @@ impl Unit {
         Self {
             port,
             server: Server::new(Framing::Rtu),
-            unit: fast::Unit::new(SERIAL, ADDRESS, part),
+            unit: fast::Unit::new(SERIAL, address, part),
             device: Device {
                 points: Points::new(40, 130),
                 events: Vec::new(),
@@ -132,19 +136,19 @@ impl Unit {
         waits
     }
 
-    /// Receives a request without CRC, whose arbitration the unit wins, unless a start bit is seen in window `lost_in`.
-    fn ask_losing_in(&mut self, request: &[u8], lost_in: Option<usize>) -> Answer {
+    /// Receives a request without CRC, and takes part in its arbitration. Returns the answer if there is none.
+    fn begin(&mut self, request: &[u8]) -> Option<Answer> {
         let mut waits = self.characters(&with_crc(request));
         if !waits {
             waits = self.port.long_silence(0);
         }
         let Some(mut request) = self.port.take().filter(|_| waits) else {
-            return Answer::Silence;
+            return Some(Answer::Silence);
         };
         if request.unit() != fast::ADDRESS {
             let reply = self.server.serve(request, &mut self.device);
             self.port.send(reply, 0);
-            return common::send(&mut self.port).map_or(Answer::Silence, Answer::Usual);
+            return Some(common::send(&mut self.port).map_or(Answer::Silence, Answer::Usual));
         }
         let (reply, contest) = if self.unit.open(&mut request) {
             let mut reply = self.server.serve(request, &mut self.device);
@@ -160,6 +164,14 @@ impl Unit {
         };
         let arbitration = Arbitration::new(contest.value, contest.windows, 0, windows);
         self.port.arbitrate(reply, arbitration);
+        None
+    }
+
+    /// Receives a request without CRC, whose arbitration the unit wins, unless a start bit is seen in window `lost_in`.
+    fn ask_losing_in(&mut self, request: &[u8], lost_in: Option<usize>) -> Answer {
+        if let Some(answer) = self.begin(request) {
+            return answer;
+        }
         let mut bits = 0;
         for window in 0.. {
             let Some(deadline) = self.port.deadline() else {
@@ -377,6 +389,73 @@ fn other_requests_in_between_do_not_change_what_was_sent() {
     assert!(matches!(unit.ask(&by_serial), Answer::After(0, 0, _)));
     let packet = bytes("05 46 11 01 01 05 01 02 00 08 01");
     assert_eq!(unit.fetch(5, 1).1, packet);
+}
+
+/// Lets all units arbitrate for a fetch with this confirmation. Returns who has won, and the flag of its packet.
+fn fetch_of_all(units: &mut [Unit], confirmed: (usize, u8)) -> (usize, u8) {
+    let address = confirmed.0 as u8 + 1;
+    for unit in &mut *units {
+        let done = unit.begin(&[0xFD, 0x46, 0x10, 0, 100, address, confirmed.1]);
+        assert_eq!(done, None);
+    }
+    loop {
+        // Zeros are sent at the beginning of a window, and ones are decided at its end.
+        let active = units
+            .iter()
+            .enumerate()
+            .filter_map(|(n, unit)| Some((unit.port.deadline()?, n)));
+        let (now, n) = active.min().expect("a unit wins");
+        match units[n].port.turn() {
+            Turn::None => {}
+            Turn::Bit(_) => {
+                units[n].port.sent();
+                for (other, unit) in units.iter_mut().enumerate() {
+                    if other != n {
+                        unit.port.fell(now);
+                    }
+                }
+            }
+            Turn::Reply(first) => {
+                assert_eq!(first, n as u8 + 1);
+                let packet: Vec<u8> = std::iter::from_fn(|| units[n].port.next_byte()).collect();
+                units[n].port.sent();
+                return (n, packet[2]);
+            }
+        }
+    }
+}
+
+#[test]
+fn each_of_several_units_that_always_have_events_has_its_turn() {
+    let mut units: Vec<Unit> = (1..=4).map(|n| Unit::at(n, Part::Everything)).collect();
+    let mut last = (usize::MAX - 1, 0);
+    let mut order = Vec::new();
+    for round in 0..40 {
+        for (n, unit) in units.iter_mut().enumerate() {
+            unit.device.has_started = false;
+            // The last one has an event from time to time.
+            if n < 3 || round % 10 == 5 {
+                unit.device.events.push((7, 1));
+            }
+        }
+        last = fetch_of_all(&mut units, (last.0, last.1));
+        order.push(last.0);
+    }
+    for n in 0..3 {
+        let turns = order.iter().filter(|winner| **winner == n).count();
+        assert!((9..=16).contains(&turns), "unit {n} in {order:?}");
+        // Two packets of each of the others, and one more of the unit that was the first to have its turn again.
+        let turns: Vec<usize> = (0..40).filter(|round| order[*round] == n).collect();
+        assert!(
+            turns.windows(2).all(|two| two[1] - two[0] <= 8),
+            "{order:?}"
+        );
+    }
+    assert_eq!(
+        order.iter().filter(|winner| **winner == 3).count(),
+        4,
+        "{order:?}"
+    );
 }
 
 #[test]

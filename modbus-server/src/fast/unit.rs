@@ -1,6 +1,7 @@
 //! A unit's part in scans and in the reports of events.
 
 use super::{ADDRESS, EventSource, FUNCTION, Kind, Packet, SERIAL_AHEAD, sub};
+use crate::line::Ending;
 use crate::server::refuse;
 use crate::{Adu, Exception, Function, Outcome, Reply, Request, Server};
 
@@ -13,7 +14,9 @@ const HIGH: u32 = 0b1000 << 8;
 const LOW: u32 = 0b1001 << 8;
 const YIELDING: u32 = 0b1110 << 8;
 const NO_EVENTS: u32 = 0b1111 << 8;
-/// Number of packets in a row after which others go first once.
+/// Number of bits of the unit address, behind the priority.
+const ADDRESS_BITS: u8 = 8;
+/// Number of packets in a row after which others go first.
 const IN_A_ROW: u8 = 2;
 /// Largest number of words that function 17 can return inside sub-function 09: 256 bytes less 7 in front, 2 of function
 /// and byte count, and 2 of the CRC are 245.
@@ -87,7 +90,7 @@ impl Unit {
     /// be served by [`Server::serve`]. [`close`](Self::close) its reply.
     #[must_use]
     pub fn open(&mut self, request: &mut Request<'_>) -> bool {
-        self.end_contest(request.won);
+        self.end_contest(request.ending);
         let adu = &mut *request.adu;
         let is_for_unit = adu.get(1) == FUNCTION
             && adu.get(2) == sub::REQUEST
@@ -128,16 +131,22 @@ impl Unit {
         }
     }
 
-    /// Notes whether the unit has won its last arbitration.
-    fn end_contest(&mut self, won: bool) {
+    /// Notes how the unit's last arbitration has ended.
+    ///
+    /// A unit that lets others go first does so until it wins, or loses to a unit that does the same: by their addresses.
+    /// Then nobody else has events. So of several units with more and more events each has its turn.
+    fn end_contest(&mut self, ending: Ending) {
         let contended = core::mem::replace(&mut self.contended, Contended::Nothing);
-        match contended {
-            Contended::ToBeFound if won => self.is_found = true,
-            Contended::Packet if won => {
+        let yields = self.in_a_row >= IN_A_ROW;
+        match (contended, ending) {
+            (Contended::ToBeFound, Ending::Won) => self.is_found = true,
+            (Contended::Packet, Ending::Won) => {
                 self.packet.was_sent = true;
-                self.in_a_row += 1;
+                self.in_a_row = if yields { 1 } else { self.in_a_row + 1 };
             }
-            Contended::Packet => self.in_a_row = 0,
+            (Contended::Packet, Ending::Lost(left)) if !yields || left < ADDRESS_BITS => {
+                self.in_a_row = 0;
+            }
             _ => {}
         }
     }
@@ -195,7 +204,6 @@ impl Unit {
         self.packet.append_to(adu);
         self.contended = Contended::Packet;
         let priority = if self.in_a_row >= IN_A_ROW {
-            self.in_a_row = 0;
             YIELDING
         } else if is_high {
             HIGH
@@ -224,7 +232,7 @@ impl Server {
         unit: &mut Unit,
         model: &mut M,
     ) -> (Reply<'a>, Contest) {
-        unit.end_contest(request.won);
+        unit.end_contest(request.ending);
         let adu = &mut *request.adu;
         let arbitrates = unit.part != Part::Requests;
         let mut outcome = Outcome::NoEffect;

@@ -60,6 +60,18 @@ pub enum Step {
     Won,
 }
 
+/// How an arbitration has ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Ending {
+    /// Not at all, or by another frame.
+    #[default]
+    None,
+    /// Another unit had the lower value. Behind the window that decided it, this number was left.
+    Lost(u8),
+    /// The unit had the lowest value.
+    Won,
+}
+
 /// The arbitration of one unit, without clock, timer or UART.
 ///
 /// Times are those of a 16-bit count that wraps, in the high half of a `u32`, with fractions of a tick in the low half.
@@ -91,6 +103,11 @@ impl Arbitration {
             edge: None,
             windows,
         }
+    }
+
+    /// Returns the number of windows that are left.
+    pub(super) const fn left(&self) -> u8 {
+        self.left
     }
 
     /// Returns the time at which [`step`](Self::step) must be called.

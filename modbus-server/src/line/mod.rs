@@ -18,7 +18,7 @@ mod timed;
 mod transmitter;
 mod units;
 
-pub use arbitration::{Arbitration, Step, Windows};
+pub use arbitration::{Arbitration, Ending, Step, Windows};
 pub use ascii::Width;
 pub use faults::Faults;
 pub use framing::Framing;

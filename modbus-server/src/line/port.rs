@@ -1,7 +1,7 @@
 //! A line as its server uses it: takes characters and silences, returns requests; takes replies, returns
 //! characters.
 
-use super::{Arbitration, Faults, Framing, Receiver, Step, Transmitter, Units};
+use super::{Arbitration, Ending, Faults, Framing, Receiver, Step, Transmitter, Units};
 use crate::{Adu, LineCounters, Reply, Request};
 
 /// One serial line of a server, without UART, timer or clock.
@@ -37,8 +37,8 @@ pub struct Port<'a, U = u8> {
     messages_before: u16,
     /// A reply that is sent if its arbitration is won.
     contender: Option<(&'a mut Adu, Arbitration)>,
-    /// The last arbitration was won.
-    won: bool,
+    /// How the last arbitration has ended.
+    ending: Ending,
 }
 
 /// What a port wants at the [deadline](Port::deadline) of an arbitration.
@@ -77,7 +77,7 @@ impl<'a, U: Units> Port<'a, U> {
             reply: State::None,
             messages_before: 0,
             contender: None,
-            won: false,
+            ending: Ending::None,
         }
     }
 
@@ -173,7 +173,7 @@ impl<'a, U: Units> Port<'a, U> {
             adu,
             line: *self.receiver.counters(),
             ended,
-            won: self.won,
+            ending: self.ending,
         })
     }
 
@@ -202,7 +202,7 @@ impl<'a, U: Units> Port<'a, U> {
     /// front of the next turn, and [`turn`](Self::turn) at each [`deadline`](Self::deadline). A frame that has come since
     /// the request ends the arbitration.
     pub fn arbitrate(&mut self, reply: Reply<'a>, arbitration: Arbitration) {
-        self.won = false;
+        self.ending = Ending::None;
         let is_late = self.request.is_some() || !self.receiver.is_idle();
         if !reply.is_answered || is_late || self.reply == State::Sending {
             return self.receiver.give_back(reply.adu);
@@ -234,6 +234,7 @@ impl<'a, U: Units> Port<'a, U> {
             Step::Wait => Turn::None,
             Step::Send => Turn::Bit(Arbitration::ZERO),
             Step::Lost => {
+                self.ending = Ending::Lost(arbitration.left());
                 self.withdraw();
                 Turn::None
             }
@@ -246,7 +247,7 @@ impl<'a, U: Units> Port<'a, U> {
         let (adu, _) = self.contender.take()?;
         self.transmitter = Transmitter::new(adu, Framing::Rtu);
         self.reply = State::Sending;
-        self.won = true;
+        self.ending = Ending::Won;
         self.receiver.end_following();
         self.transmitter.next()
     }
