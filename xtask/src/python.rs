@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context as _, Result, ensure};
-use register_map::board::{MODIO_02, MODIO_08};
+use register_map::board::{FX3U_24, MODIO_02, MODIO_08};
 
 use crate::error::missing;
 use crate::workspace::Workspace;
@@ -84,6 +84,9 @@ pub fn masters(workspace: &mut Workspace) -> Result<()> {
 /// Runs the tests of the simulator's page.
 pub fn page(workspace: &mut Workspace) -> Result<()> {
     let mut script = on_page(workspace, RUN)?;
+    script
+        .arg("--elf-fx3u")
+        .arg(build::image(workspace, &FX3U_24)?);
     command::run(script.arg("--tests").arg(workspace.root.join(PAGE)))
 }
 

@@ -80,6 +80,8 @@ class Terminal:
     """Name on the board, such as "X0"."""
     kind: str
     """"input", "relay", "voltage", "current", "potentiometer", "output", "switch" or "supply"."""
+    point: Optional[int] = None
+    """Address of its point, 0 to 31. None for a terminal without one."""
     energised: Optional[bool] = None
     """Of a digital input: voltage is applied. Of a relay: its coil is energised."""
     millivolts: Optional[int] = None

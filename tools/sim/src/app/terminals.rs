@@ -1,8 +1,11 @@
 //! The terminals of a board with fixed inputs and outputs, as they are in JSON.
 
+use register_map::Module;
+use register_map::configuration::module_of;
+use register_map::points::Kind;
 use serde::Serialize;
 use sim::Board;
-use sim::board::terminals::Value;
+use sim::board::terminals::{self, Value};
 use utoipa::ToSchema;
 
 /// A terminal of a board, or an element on it that a person moves.
@@ -11,6 +14,10 @@ pub struct Terminal {
     /// Name on the board.
     #[schema(examples("X0", "Y0", "AD0", "POT0", "DA0", "RUN", "24V"))]
     name: &'static str,
+    /// Address of its point, if the board has one for it: to read, or for a relay to write.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(maximum = 31)]
+    point: Option<u16>,
     #[serde(flatten)]
     state: TerminalState,
 }
@@ -63,13 +70,45 @@ impl From<Value> for TerminalState {
 
 /// Returns the terminals of a board, in their order on it.
 pub fn of_board(board: &Board) -> Vec<Terminal> {
+    let mut points = points(board);
     let terminals = board.terminals().iter();
     terminals
-        .map(|(terminal, value)| Terminal {
-            name: terminal.name,
-            state: value.into(),
+        .map(|(terminal, value)| {
+            let kind = kind_of(terminal.kind);
+            let at = points.iter().position(|(each, _)| *each == kind);
+            Terminal {
+                name: terminal.name,
+                point: at.map(|at| points.remove(at).1),
+                state: value.into(),
+            }
         })
         .collect()
+}
+
+/// Returns kind and address of the points of a board with fixed inputs and outputs. Those of a kind have the order of
+/// their terminals.
+fn points(board: &Board) -> Vec<(Kind, u16)> {
+    let layout = board.layout();
+    let row = layout.board;
+    let ports = row.ports().zip(row.fixed).flat_map(|(port, fixed)| {
+        let stored = layout.stored(board.flash(), module_of(port));
+        let module = stored.and_then(Module::from_code);
+        row.kinds(port, module.unwrap_or(fixed.module))
+    });
+    ports.zip(row.points().start..).collect()
+}
+
+const fn kind_of(terminal: terminals::Kind) -> Kind {
+    match terminal {
+        terminals::Kind::Input | terminals::Kind::Switch | terminals::Kind::Supply => {
+            Kind::BitInput
+        }
+        terminals::Kind::Relay => Kind::BitOutput,
+        terminals::Kind::Voltage | terminals::Kind::Current | terminals::Kind::Potentiometer => {
+            Kind::WordInput
+        }
+        terminals::Kind::Output => Kind::WordOutput,
+    }
 }
 
 /// The body of `POST /api/terminals/NAME`: what is applied to the terminal.

@@ -27,6 +27,7 @@ def main() -> int:
     parser.add_argument("--sim", required=True, type=pathlib.Path, help="the program modio-sim")
     parser.add_argument("--elf", required=True, type=pathlib.Path, help="the image of the modio-02")
     parser.add_argument("--elf-08", type=pathlib.Path, help="the image of the modio-08")
+    parser.add_argument("--elf-fx3u", type=pathlib.Path, help="the image of the fx3u-24")
     parser.add_argument("--loader", type=pathlib.Path, help="the loader of the modio-02")
     parser.add_argument("--update", type=pathlib.Path, help="the file of an update of the modio-02")
     parser.add_argument("--tests", type=pathlib.Path, help="the tests of this directory instead")
@@ -35,6 +36,7 @@ def main() -> int:
     # The tests and the client read these variables.
     for variable, file in (
             ("MODIO_SIM", options.sim), ("MODIO_ELF", options.elf), ("MODIO_ELF_08", options.elf_08),
+            ("MODIO_ELF_FX3U", options.elf_fx3u),
             ("MODIO_LOADER", options.loader), ("MODIO_UPDATE", options.update)):
         if file is None:
             continue

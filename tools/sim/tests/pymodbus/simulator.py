@@ -30,7 +30,7 @@ class Simulator(modio_sim.Simulator):
     @classmethod
     def of(cls, *, board: str = "modio-02", options=(), **more) -> "Simulator":
         """Starts a simulator with the image for this board, which run.py names."""
-        image = {"modio-02": "MODIO_ELF", "modio-08": "MODIO_ELF_08"}[board]
+        image = {"modio-02": "MODIO_ELF", "modio-08": "MODIO_ELF_08", "fx3u-24": "MODIO_ELF_FX3U"}[board]
         return cls.start(board=board, elf=os.environ[image], options=options, **more)
 
     def end_well(self):

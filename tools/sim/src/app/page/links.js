@@ -2,7 +2,7 @@
 // because each request keeps a unit with COMM_TIMEOUT from noticing that its master is gone.
 
 import { actions, readings, registers } from "/map.js";
-import { address, pointName, slotsOf, unitName } from "/model.js";
+import { address, numberOf, pointName, portOf, slotsOf, unitName } from "/model.js";
 import * as modbus from "/modbus.js";
 import { byId, element, select, setText } from "/ui.js";
 
@@ -31,6 +31,7 @@ let previous = Promise.resolve();
 /** Returns the points that can be the source or the output of a link. A relay has its jumper, and its coil two higher.
  * The unit does not serve the points of a module that is not the configured one. */
 function pointsOf(state) {
+  if (state.terminals) return pointsOfTerminals(state.terminals);
   const slots = slotsOf(state).filter(({ module, configured }) => module === configured);
   const all = slots.flatMap((slot) => slot.channels.flatMap(({ kind }, n) => {
     const point = (number) => ({ port: slot.port, kind, name: pointName(slot.port, number), address: Number(address(slot.port, number)) });
@@ -40,9 +41,17 @@ function pointsOf(state) {
   return { inputs: all.filter((each) => !each.isOutput), outputs: all.filter((each) => each.isOutput) };
 }
 
-/** Shows the part of the page if the board has links, which needs several slots. */
+function pointsOfTerminals(terminals) {
+  const all = terminals.filter(({ point, kind }) => point !== undefined && kind !== "output").map(({ name, kind, point }) => ({
+    port: portOf(point), kind: ["voltage", "current", "potentiometer"].includes(kind) ? "ai" : "di",
+    name: `${pointName(portOf(point), numberOf(point))} (${name})`, address: point, isOutput: kind === "relay",
+  }));
+  return { inputs: all.filter((each) => !each.isOutput), outputs: all.filter((each) => each.isOutput) };
+}
+
+/** Shows the part of the page if the board has links, which needs several ports. */
 export function show(state) {
-  byId("links-section").hidden = !state.slots;
+  byId("links-section").hidden = !state.slots && !state.terminals;
   byId("links-section").inert = !state.powered;
   const now = pointsOf(state);
   if (JSON.stringify(now) === JSON.stringify(points)) return;

@@ -81,6 +81,10 @@ export function address(port, number) {
   return `0x${((port - 1) * 4 + number - 1).toString(16).padStart(4, "0")}`;
 }
 
+/** Returns the port of an address, and the number of the point in it, from 1. */
+export const portOf = (point) => Math.floor(point / 4) + 1;
+export const numberOf = (point) => (point % 4) + 1;
+
 /** Returns the name of a unit in UCUM, for people. */
 export const unitName = (code) => ({ Cel: "°C", uA: "µA" })[code] ?? code;
 

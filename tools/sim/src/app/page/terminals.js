@@ -1,6 +1,7 @@
 // The terminals of a board with fixed inputs and outputs: their controls and displays, in the order on the board.
 
 import { post, stream, isStreaming } from "/api.js";
+import { address, numberOf, pointName, portOf } from "/model.js";
 import { byId, element, setText } from "/ui.js";
 
 /** The groups of a board, each with its kinds of terminals. */
@@ -32,7 +33,7 @@ const idOf = (name) => `t-${name}`;
 const pathOf = (name) => `terminals/${encodeURIComponent(name)}`;
 
 /** The part of the terminals whose change needs new elements. */
-export const shape = (state) => (state.terminals ?? []).map(({ name }) => name);
+export const shape = (state) => (state.terminals ?? []).map(({ name, point }) => [name, point]);
 
 /** Makes the elements of all groups that the board has. */
 export function build(state) {
@@ -43,9 +44,14 @@ export function build(state) {
       element("div", { class: "channels" }, ...members.map(buildTerminal))));
 }
 
-function buildTerminal({ name, kind }) {
+function buildTerminal({ name, kind, point }) {
+  const labels = [element("span", {}, name)];
+  if (point !== undefined) {
+    const [port, number] = [portOf(point), numberOf(point)];
+    labels.push(element("code", {}, pointName(port, number)), element("code", {}, address(port, number)));
+  }
   return element("div", { class: `channel ${kind}`, role: "group", "aria-label": `Terminal ${name}` },
-    element("div", { class: "name" }, element("span", {}, name)), ...control(name, kind));
+    element("div", { class: "name" }, ...labels), ...control(name, kind));
 }
 
 function control(name, kind) {

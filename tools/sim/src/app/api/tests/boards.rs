@@ -190,8 +190,11 @@ fn terminals_of_the_fx3u_are_addressed_by_their_names() {
     assert_eq!(terminals.len(), 36);
     assert_eq!(
         terminals[0],
-        json!({"name": "X0", "kind": "input", "energised": false})
+        json!({"name": "X0", "point": 0, "kind": "input", "energised": false})
     );
+    for (at, point) in [(34, json!(14)), (30, Value::Null)] {
+        assert_eq!(terminals[at]["point"], point, "{}", terminals[at]);
+    }
     for (at, path, body) in [
         (0, "X0", json!({"energised": true})),
         (24, "AD0", json!({"millivolts": 10_000})),
