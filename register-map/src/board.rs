@@ -8,7 +8,7 @@ use crate::fixed::FixedPort;
 use crate::kind::Kind;
 use crate::layout::{Layout, TwoPages};
 use crate::part::{KIB, Part, STM32F103C8, STM32F103CB, STM32F103RC, STM32F103VC};
-use crate::{BLOCKS, Module, Rule, Text, configuration, links, points};
+use crate::{BLOCKS, Module, Rule, Text, configuration, deadband, links, points};
 
 /// A board that the firmware is built for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -282,6 +282,12 @@ impl Board {
         registers.filter(|(rule, _)| self.has(rule.first))
     }
 
+    /// Returns whether the firmware of the board serves function 70. The flash of the smallest parts has no room for it.
+    #[must_use]
+    pub const fn reports_events(&self) -> bool {
+        self.memory().part.flash > 128 * KIB
+    }
+
     /// Returns whether the board has a register, which every board has or every board of some kind. Links exist only for
     /// some of the points.
     #[must_use]
@@ -289,6 +295,7 @@ impl Board {
         match address {
             configuration::UNIT => !self.switch,
             configuration::LORA..=configuration::LORA_FRAME_GAP => self.radio,
+            _ if deadband::contain(address) => self.reports_events(),
             _ => links::exist(self.slots as usize) || !links::contain(address),
         }
     }

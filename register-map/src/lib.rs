@@ -30,6 +30,7 @@ pub mod codes;
 mod commit;
 pub mod configuration;
 pub mod counters;
+pub mod deadband;
 pub mod edges;
 pub mod fault;
 mod fixed;
@@ -62,7 +63,7 @@ pub use value::{Field, Unit, Value};
 pub use values::Values;
 
 /// Every block, in ascending order of the addresses.
-pub static BLOCKS: [&Block; 9] = [
+pub static BLOCKS: [&Block; 10] = [
     &points::BLOCK,
     &name::BLOCK,
     &configuration::BLOCK,
@@ -72,4 +73,5 @@ pub static BLOCKS: [&Block; 9] = [
     &counters::BLOCK,
     &edges::BLOCK,
     &links::BLOCK,
+    &deadband::BLOCK,
 ];

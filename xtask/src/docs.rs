@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use register_map::points::Kind;
 use register_map::{
     BLOCKS, Block, Board, Field, InForce, Module, Rule, Scope, Text, Unit, Value, Values, codes,
-    configuration, counters, edges, fault, links, points,
+    configuration, counters, deadband, edges, fault, links, points,
 };
 
 const INTRODUCTION: &str = "\
@@ -64,6 +64,11 @@ A counter wraps. A write of 0 to both registers of a point in one request clears
 const EDGE_NOTES: &str = "
 The uptime is that of 0x0226. File 3 (function 14) is the log of the last 64 edges of all digital inputs:
 [time-and-links.md](time-and-links.md).
+";
+
+const DEADBAND_NOTES: &str = "
+Only boards with [function 70](fast-modbus.md) have it. It is a setting as those of the configuration, in the unit of the
+point. A change of MODULE sets it to 0.
 ";
 
 const LINK_NOTES: &str = "
@@ -123,6 +128,8 @@ fn write_markdown(out: &mut impl Write) -> Result {
             out.write_str(EDGE_NOTES)?;
         } else if block.first == links::BLOCK.first {
             out.write_str(LINK_NOTES)?;
+        } else if block.first == deadband::BLOCK.first {
+            out.write_str(DEADBAND_NOTES)?;
         }
     }
     Ok(())
@@ -134,7 +141,7 @@ fn write_registers(block: &Block, out: &mut impl Write) -> Result {
     {
         return write_fields(rule, text.name, fields, out);
     }
-    let settings = block.first == configuration::BLOCK.first;
+    let settings = [configuration::BLOCK.first, deadband::BLOCK.first].contains(&block.first);
     out.write_str(if settings {
         "| address | name | values (default) | unit | in force | what |\n|---|---|---|---|---|---|\n"
     } else {

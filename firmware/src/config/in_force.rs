@@ -4,7 +4,10 @@ use modio_drivers::{ChannelSettings, LoraSettings, Scale, Signal};
 use register_map::codes::{Format, GapRule, Mode};
 use register_map::configuration as at;
 
+use register_map::deadband::DEADBAND;
+
 use super::Settings;
+use crate::HAS_EVENTS;
 
 /// Settings of the RS-485 line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -83,6 +86,9 @@ pub struct Point {
     /// Output when the line is silent for too long: 0 or 1 for a bit, 0 to 4095 raw for a word; `None` holds the
     /// output.
     pub safe: Option<u16>,
+    /// Change of an analog input that is an event, in its unit; 0 for 1/256 of its range.
+    #[cfg(not(feature = "small"))]
+    pub deadband: u16,
     /// Output at power-on: 0 or 1 for a bit, 0 to 4095 raw for a word.
     pub start: u16,
 }
@@ -99,6 +105,8 @@ impl Point {
                 scale: Scale::from_code(get(at::SCALE)).unwrap_or_default(),
             },
             safe: Some(get(at::SAFE)).filter(|safe| *safe != at::HOLD),
+            #[cfg(not(feature = "small"))]
+            deadband: get(DEADBAND),
             start: get(at::START),
         }
     }

@@ -1,5 +1,5 @@
-//! The configuration, registers 0x0100 to 0x01FF, and the links, 0x0400 to 0x04FF: which writes are allowed, the edited settings, the stored
-//! settings and the settings in force.
+//! The configuration, registers 0x0100 to 0x01FF, the links, 0x0400 to 0x04FF, and DEADBAND, 0x0500 to 0x051F: which
+//! writes are allowed, the edited settings, the stored settings and the settings in force.
 //!
 //! A setting has three values:
 //!
@@ -35,9 +35,9 @@ use register_map::configuration::{
     COMM_SOURCE, COMM_TIMEOUT, COMMAND, FILTER, FORMAT, KEY, LORA, LORA_FRAME_GAP, MODE, MODULE,
     RANGE, RESPONSE_DELAY, RULES, SAVES, SERIAL_LOW, UNIT,
 };
-use register_map::points;
 use register_map::state::status;
 use register_map::{Board, Module, Run, Runs, links as links_map, runs};
+use register_map::{deadband, points};
 
 use crate::HAS_SLOTS;
 pub use in_force::{LineConfig, Point, RadioConfig};
@@ -46,7 +46,9 @@ use lock::Lock;
 pub use origin::{LineName, Origin};
 use saves::Saves;
 pub use settings::RestartValues;
-use settings::{RESTARTS, format_suits_mode, port_of, restart_addresses, takes_module};
+use settings::{
+    RESTARTS, format_suits_mode, has_deadband, port_of, restart_addresses, takes_module,
+};
 pub use settings::{Settings, kinds};
 
 /// How far a save is.
@@ -58,6 +60,20 @@ enum Save {
     Ordered,
     /// The settings to be stored are set aside.
     Begun,
+}
+
+/// Checks whether registers of DEADBAND exist. The first one does.
+///
+/// # Errors
+///
+/// Exception 02 when the span goes beyond the last one.
+fn check_deadbands(span: Span) -> Result<(), Exception> {
+    let end = u32::from(deadband::BLOCK.last) + 1;
+    if span.end() <= end {
+        Ok(())
+    } else {
+        Err(Exception::IllegalDataAddress)
+    }
 }
 
 /// The configuration of a running device on a board with `SLOTS` slots.
@@ -180,6 +196,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
     pub fn check_read(&self, span: Span) -> Result<(), Exception> {
         match runs(RULES, span.start(), span.count()) {
             _ if Links::<SLOTS>::contain(span.start()) => self.check_links(span),
+            _ if has_deadband(span.start()) => check_deadbands(span),
             Some(_) if self.has(span) => Ok(()),
             _ => Err(Exception::IllegalDataAddress),
         }
@@ -225,6 +242,9 @@ impl<const SLOTS: usize> Config<SLOTS> {
         let suits = if Links::<SLOTS>::contain(span.start()) {
             self.check_links(span)?;
             self.suits_the_links(span, words)
+        } else if has_deadband(span.start()) {
+            check_deadbands(span)?;
+            true
         } else {
             let runs = runs(RULES, span.start(), span.count());
             let runs = runs.filter(|_| self.lets_write(span));
@@ -331,7 +351,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
     pub fn write(&mut self, span: Span, words: Words<'_>) -> Option<Command> {
         self.lock.open(self.origin.line);
         let mut command = None;
-        if (FILTER..links_map::LINKS).contains(&span.start()) {
+        if (FILTER..links_map::LINKS).contains(&span.start()) || has_deadband(span.start()) {
             // These registers do not affect others.
             let edited = self.edited.slice_mut(span.start(), span.count());
             for (edited, value) in edited.iter_mut().zip(words.iter()) {

@@ -5,14 +5,17 @@ use register_map::codes::{Format, Mode};
 use register_map::configuration::{
     self, COMMAND, FORMAT, KEY, MODE, MODULE, RANGE, RULES, module_of,
 };
+use register_map::deadband::{self, DEADBAND};
 use register_map::points::{self, Kind};
 use register_map::{Board, InForce, Module, Rule, links, rule_at};
 
 use super::links::Links;
-use crate::HAS_SLOTS;
+use crate::{HAS_EVENTS, HAS_SLOTS};
 
 /// High byte of every configuration address. The low byte is the index in [`Settings`].
 const PAGE: u16 = KEY >> 8;
+/// Number of values in [`Settings`]. DEADBAND is behind those of the configuration.
+const VALUES: usize = if HAS_EVENTS { 256 + 32 } else { 256 };
 
 /// Number of settings that need a restart.
 pub(super) const RESTARTS: usize = restarts();
@@ -28,8 +31,8 @@ pub struct RestartValues(pub(super) [u16; RESTARTS]);
 #[repr(align(4))]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings<const SLOTS: usize> {
-    /// Indexed by the low byte of the address. KEY, COMMAND and gaps hold 0.
-    values: [u16; 256],
+    /// See [`place`]. KEY, COMMAND and gaps hold 0.
+    values: [u16; VALUES],
     board: &'static Board,
     pub(super) links: Links<SLOTS>,
 }
@@ -39,7 +42,7 @@ impl<const SLOTS: usize> Settings<SLOTS> {
     #[must_use]
     pub fn defaults(board: &'static Board) -> Self {
         let mut settings = Self {
-            values: [0; 256],
+            values: [0; VALUES],
             board,
             links: Links::new(board.points().start),
         };
@@ -73,6 +76,7 @@ impl<const SLOTS: usize> Settings<SLOTS> {
                         && settings.takes_range(address, value)
                 }
                 None if Links::<SLOTS>::contain(address) => settings.has_link(address),
+                None if has_deadband(address) => true,
                 None => continue,
             };
             if allowed {
@@ -94,9 +98,8 @@ impl<const SLOTS: usize> Settings<SLOTS> {
     #[inline(never)]
     #[must_use]
     pub fn get(&self, address: u16) -> u16 {
-        let [page, place] = address.to_be_bytes();
-        match self.values.get(usize::from(place)) {
-            Some(value) if u16::from(page) == PAGE => *value,
+        match self.values.get(place(address)) {
+            Some(value) if is_held(address) => *value,
             _ => self.links.at(address).map_or(0, |link| link.word(address)),
         }
     }
@@ -147,7 +150,7 @@ impl<const SLOTS: usize> Settings<SLOTS> {
     /// Returns `count` values from an address on, to be changed. The range must not contain MODULE, KEY or COMMAND.
     #[inline]
     pub(super) fn slice_mut(&mut self, start: u16, count: u16) -> &mut [u16] {
-        let start = usize::from(start & 0xFF);
+        let start = place(start);
         let end = start.saturating_add(usize::from(count));
         self.values.get_mut(start..end).unwrap_or_default()
     }
@@ -155,7 +158,7 @@ impl<const SLOTS: usize> Settings<SLOTS> {
     /// Returns `count` values from an address on.
     #[inline]
     pub(super) fn slice(&self, start: u16, count: u16) -> &[u16] {
-        let start = usize::from(start & 0xFF);
+        let start = place(start);
         let end = start.saturating_add(usize::from(count));
         self.values.get(start..end).unwrap_or_default()
     }
@@ -210,6 +213,10 @@ impl<const SLOTS: usize> Settings<SLOTS> {
         if !HAS_SLOTS {
             self.set_ranges(port);
         }
+        if HAS_EVENTS {
+            self.slice_mut(DEADBAND.wrapping_add(first), points::CHANNELS)
+                .fill(0);
+        }
         self.drop_links(Some(self.links.slot_of(first)));
     }
 
@@ -239,16 +246,36 @@ impl<const SLOTS: usize> Settings<SLOTS> {
     }
 
     fn put(&mut self, address: u16, value: u16) {
-        let [page, place] = address.to_be_bytes();
-        if Links::<SLOTS>::EXIST && u16::from(page) != PAGE {
+        if Links::<SLOTS>::EXIST && !is_held(address) {
             self.links.set(address, value);
-        } else if let Some(held) = self.values.get_mut(usize::from(place)) {
+        } else if let Some(held) = self.values.get_mut(place(address)) {
             *held = value;
         }
     }
 }
 
-/// Returns the number of words that differ. There are at most 256.
+/// Returns the index of a setting that is not one of a link.
+#[inline]
+const fn place(address: u16) -> usize {
+    if has_deadband(address) {
+        256 + (address - DEADBAND) as usize
+    } else {
+        (address & 0xFF) as usize
+    }
+}
+
+/// Returns whether an address is that of a setting, not one of a link.
+#[inline]
+const fn is_held(address: u16) -> bool {
+    address >> 8 == PAGE || has_deadband(address)
+}
+
+/// Returns whether the board has DEADBAND at this address.
+pub(super) const fn has_deadband(address: u16) -> bool {
+    HAS_EVENTS && deadband::contain(address)
+}
+
+/// Returns the number of words that differ. There are at most 288.
 pub(super) fn differences(a: &[u16], b: &[u16]) -> u16 {
     a.iter().zip(b).map(|(a, b)| u16::from(a != b)).sum()
 }
@@ -357,6 +384,15 @@ impl<const SLOTS: usize> Iterator for Changed<'_, SLOTS> {
             let address = self.links;
             self.links = address.wrapping_add(1);
             if let Some(value) = self.settings.links.changed(address) {
+                return Some((address, value));
+            }
+        }
+        // DEADBAND follows the links.
+        while has_deadband(self.links) {
+            let address = self.links;
+            self.links = address.wrapping_add(1);
+            let value = self.settings.get(address);
+            if value != 0 {
                 return Some((address, value));
             }
         }

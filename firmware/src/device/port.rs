@@ -4,6 +4,7 @@ use modio_drivers::{CHANNELS, ChannelSettings, ChannelStatus, Channels, Code, Ki
 use register_map::codes::ModuleState;
 use register_map::limits;
 
+use crate::HAS_EVENTS;
 use crate::config::Point;
 use crate::links::Act;
 
@@ -21,6 +22,8 @@ pub struct IoPort {
     edges: [u32; CHANNELS],
     /// Uptime in ms at which a pulse of each digital output ends; 0 without a pulse.
     pulse_ends: [u32; CHANNELS],
+    /// Changes of words that are events; 0 for 1/256 of the range.
+    deadbands: [u16; if HAS_EVENTS { CHANNELS } else { 0 }],
     /// The inputs have been scanned once. From then on a rising edge counts.
     scanned: bool,
     /// Channels that cannot be read or driven, channel 1 in bit 0.
@@ -39,6 +42,7 @@ impl IoPort {
             pulses: [0; CHANNELS],
             edges: [0; CHANNELS],
             pulse_ends: [0; CHANNELS],
+            deadbands: Default::default(),
             scanned: false,
             failing: 0,
         }
@@ -59,6 +63,10 @@ impl IoPort {
         }
         *settings = to.settings;
         *safe = to.safe;
+        #[cfg(not(feature = "small"))]
+        if let Some(deadband) = self.deadbands.get_mut(channel) {
+            *deadband = to.deadband;
+        }
     }
 
     /// Returns the settings that were applied last.
@@ -172,8 +180,13 @@ impl IoPort {
         }
     }
 
-    /// Returns the smallest change of a word that is an event: 1/256 of its range.
+    /// Returns the smallest change of a word that is an event.
     pub(super) fn deadband(&self, channel: usize) -> u16 {
+        if let Some(set) = self.deadbands.get(channel)
+            && *set != 0
+        {
+            return *set;
+        }
         let range = self.setting(channel).map(|setting| {
             let (min, max) = limits::of_input(setting.signal, setting.scale);
             max.abs_diff(min)

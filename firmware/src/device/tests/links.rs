@@ -91,7 +91,6 @@ fn links_of_digital_outputs_alone_exist() {
             "{address:#06x}"
         );
     }
-    assert_eq!(bench.read(0x0500, 1), Err(2));
     let mut single = Bench::new(Module::Do4, &[]);
     assert_eq!(single.read(0x0440, 16), Err(2), "a board with one slot");
     assert_eq!(single.write(0x0440, &NONE), Err(2));

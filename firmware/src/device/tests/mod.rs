@@ -2,6 +2,7 @@
 
 extern crate std;
 
+mod deadband;
 mod edges;
 mod files;
 mod links;
