@@ -4,10 +4,7 @@ use modio_drivers::{ChannelSettings, LoraSettings, Scale, Signal};
 use register_map::codes::{Format, GapRule, Mode};
 use register_map::configuration as at;
 
-use register_map::deadband::DEADBAND;
-
 use super::Settings;
-use crate::HAS_EVENTS;
 
 /// Settings of the RS-485 line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,7 +103,7 @@ impl Point {
             },
             safe: Some(get(at::SAFE)).filter(|safe| *safe != at::HOLD),
             #[cfg(not(feature = "small"))]
-            deadband: get(DEADBAND),
+            deadband: get(register_map::deadband::DEADBAND),
             start: get(at::START),
         }
     }
