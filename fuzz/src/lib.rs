@@ -5,6 +5,7 @@
 //! |---|---|---|
 //! | `receiver_rtu`, `receiver_ascii` | characters, faults, silences, buffers in use by requests | [`modbus_reference::Receiver`] |
 //! | `pdu` | requests of any content to one server, and their replies | [`modbus_reference::Server`] |
+//! | `fast` | frames of function 70, arbitrations, edges, to a whole device | none: replies are valid, and the unit works in the end |
 //! | `store` | flash pages of any content, saves, starts, power cuts, wear | [`pages`]; a start finds what was saved last |
 //! | `update` | a slot with any content; pages of the boot state with any content, changes, starts, power cuts | the header read in another way; a start finds what was written last |
 //! | `description` | a document with any content | none: its own limits, and the same after encoding and decoding |
@@ -15,6 +16,7 @@
 #[allow(missing_docs, clippy::all)] // the tests' own
 pub mod common;
 pub mod description;
+pub mod fast;
 #[path = "../../firmware/tests/store/flash.rs"]
 #[allow(missing_docs, dead_code)] // as above
 mod flash;
