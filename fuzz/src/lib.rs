@@ -10,7 +10,7 @@
 //! | `update` | a slot with any content; pages of the boot state with any content, changes, starts, power cuts | the header read in another way; a start finds what was written last |
 //! | `description` | a document with any content | none: its own limits, and the same after encoding and decoding |
 //!
-//! Every target accepts any bytes. `examples/seeds` writes the seeds in `corpus/`.
+//! Every target accepts any bytes.
 
 #[path = "../../modbus-server/tests/common/mod.rs"]
 #[allow(missing_docs, clippy::all)] // the tests' own
