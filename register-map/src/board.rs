@@ -77,7 +77,7 @@ struct Row {
 const FX3U: Memory = Memory {
     part: STM32F103VC,
     smaller: None,
-    stack: 11 * KIB,
+    stack: 14 * KIB,
     budget: [68 * KIB, 20 * KIB],
     interrupts: ["UART4", "USART1", "EXTI3"],
 };
@@ -180,8 +180,8 @@ const ROWS: [Row; 5] = [
         memory: Memory {
             part: STM32F103CB,
             smaller: None,
-            stack: 8 * KIB,
-            budget: [53 * KIB, 11 * KIB + 256],
+            stack: 8 * KIB + 512,
+            budget: [53 * KIB, 11 * KIB],
             interrupts: ["USART2", "USART3", "EXTI2"],
         },
     },

@@ -10,7 +10,7 @@ use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 
-use conformance::case::Case;
+use conformance::case::{Case, Need, case};
 use conformance::cases::all;
 use conformance::cli::waits;
 use conformance::endpoint::Endpoint;
@@ -23,7 +23,7 @@ use conformance::run::{Outcome, Verdict, run};
 use modbus_line::LineFormat;
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 use register_map::board::{ETH_IO5R, FX3U_24, MODIO_02, MODIO_08};
-use register_map::{Board, Module, configuration};
+use register_map::{Board, Module, configuration, state};
 
 fn elf(board: &Board) -> PathBuf {
     let name = match board.name {
@@ -68,6 +68,18 @@ fn outcomes(endpoint: &mut dyn Endpoint, dip: u8, mode: Mode, cases: &[Case]) ->
     run(endpoint, &target, cases).expect("the endpoint works")
 }
 
+/// At least a KiB of the stack was never used. The last case, so that all others have used it.
+const STACK: Case = case(
+    "modio/stack",
+    "map, 0x020B",
+    "at least 1024 bytes of the stack are free",
+    &[Need::Modio],
+    |bench| {
+        let free = bench.read_word(state::STACK_FREE)?;
+        bench.ensure(free >= 1024, format!("{free} bytes of the stack are free"))
+    },
+);
+
 fn in_process(fitting: &Fitting, cases: &[Case]) -> Vec<Outcome> {
     let mut endpoint = start(fitting).expect("the image can be read");
     outcomes(&mut endpoint, fitting.dip, fitting.mode, cases)
@@ -88,7 +100,8 @@ fn passed(outcomes: &[Outcome]) -> usize {
 
 /// Runs these cases in process. No case may fail, and more than `least` have to pass.
 fn conforms(fitting: &Fitting, cases: &[Case], least: usize) {
-    assert_conforms(&in_process(fitting, cases), &format!("{fitting:?}"), least);
+    let cases = [cases, &[STACK]].concat();
+    assert_conforms(&in_process(fitting, &cases), &format!("{fitting:?}"), least);
 }
 
 fn assert_conforms(outcomes: &[Outcome], unit: &str, least: usize) {
