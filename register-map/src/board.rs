@@ -279,7 +279,21 @@ impl Board {
     pub fn registers(&self) -> impl Iterator<Item = (&'static Rule, &'static Text)> {
         let blocks = BLOCKS.iter().skip(1);
         let registers = blocks.flat_map(|block| block.registers());
-        registers.filter(|(rule, _)| self.has(rule.first))
+        let registers = registers.filter(|(rule, _)| self.has(rule.first));
+        registers.map(|register| match register.0.first {
+            configuration::START if !self.keeps_outputs() => {
+                let (rule, text) = &configuration::PLAIN_START;
+                (rule, text)
+            }
+            _ => register,
+        })
+    }
+
+    /// Returns whether the firmware of the board can start outputs as they were. The flash of the smallest parts has no
+    /// room for this.
+    #[must_use]
+    pub const fn keeps_outputs(&self) -> bool {
+        self.memory().part.flash > 128 * KIB
     }
 
     /// Returns whether the board has a register, which every board has or every board of some kind. Links exist only for
@@ -406,6 +420,20 @@ mod tests {
         let slots = |board: &Board| (0..10).filter(|port| board.has_slot(*port)).count();
         assert_eq!((slots(&MODIO_02), slots(&MODIO_08)), (1, 4));
         assert!(MODIO_02.ports().eq([5]) && MODIO_08.ports().eq(1..=4));
+    }
+
+    #[test]
+    fn start_as_it_was_exists_on_boards_that_keep_outputs() {
+        for board in Board::ALL {
+            let start = |(rule, _): &(&Rule, &Text)| rule.first == configuration::START;
+            let (rule, text) = board.registers().find(start).unwrap();
+            let kinds = [Kind::BitOutput, Kind::WordOutput];
+            let allowed = kinds.map(|kind| rule.values_for(kind).allow(configuration::AS_IT_WAS));
+            assert_eq!(allowed, [board.keeps_outputs(); 2], "{board}");
+            assert_eq!(text.about.contains("as it was"), board.keeps_outputs());
+            assert_eq!((text.name, rule.count), ("START", 32));
+        }
+        assert!(MODIO_08.keeps_outputs() && !MODIO_02.keeps_outputs());
     }
 
     #[test]

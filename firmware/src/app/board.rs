@@ -1,7 +1,7 @@
 //! The board of this image, as it appears in the register map and the self-description.
 
 use board_support::boards::{self, AddressPins, PortKind, SlotPins};
-use firmware::device::Fixed;
+use firmware::{KEEPS_OUTPUTS, device::Fixed};
 use register_map::{Board, FixedPort, Module, layout::Layout};
 
 /// The board's row in the register map, found by name.
@@ -26,6 +26,7 @@ pub type Settings = firmware::config::Settings<{ boards::SLOTS }>;
 const _: () = {
     assert!(BOARD.slots as usize == boards::SLOTS);
     assert!(BOARD.switch == matches!(boards::BOARD.address, AddressPins::Switch(_)));
+    assert!(BOARD.keeps_outputs() == KEEPS_OUTPUTS);
     assert!(BOARD.radio == boards::BOARD.radio.is_some());
     assert!(BOARD.fixed.is_empty() == boards::BOARD.has_slots());
     let mut port = 0;

@@ -5,6 +5,7 @@ use register_map::codes::{Format, GapRule, Mode};
 use register_map::configuration as at;
 
 use super::Settings;
+use crate::KEEPS_OUTPUTS;
 
 /// Settings of the RS-485 line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -83,7 +84,8 @@ pub struct Point {
     /// Output when the line is silent for too long: 0 or 1 for a bit, 0 to 4095 raw for a word; `None` holds the
     /// output.
     pub safe: Option<u16>,
-    /// Output at power-on: 0 or 1 for a bit, 0 to 4095 raw for a word.
+    /// Output at power-on: 0 or 1 for a bit, 0 to 4095 raw for a word. 0 for an output that is to start as it was, until
+    /// its value is restored.
     pub start: u16,
 }
 
@@ -99,7 +101,10 @@ impl Point {
                 scale: Scale::from_code(get(at::SCALE)).unwrap_or_default(),
             },
             safe: Some(get(at::SAFE)).filter(|safe| *safe != at::HOLD),
-            start: get(at::START),
+            start: match get(at::START) {
+                at::AS_IT_WAS if KEEPS_OUTPUTS => 0,
+                start => start,
+            },
         }
     }
 }

@@ -20,6 +20,7 @@ mod description;
 mod edge_log;
 mod events;
 mod identification;
+mod keeping;
 mod linking;
 mod points;
 mod port;

@@ -205,7 +205,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
     pub fn write_words(&mut self, span: Span, words: Words<'_>) {
         for (index, word) in self.indices(span).zip(words.iter()) {
             if let Some((port, channel)) = self.place_mut(index) {
-                port.channels.set_word(channel, word);
+                port.set_word(channel, word);
             }
         }
     }

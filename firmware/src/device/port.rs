@@ -4,8 +4,12 @@ use modio_drivers::{CHANNELS, ChannelSettings, ChannelStatus, Channels, Code, Ki
 use register_map::codes::ModuleState;
 use register_map::limits;
 
+use crate::KEEPS_OUTPUTS;
 use crate::config::Point;
 use crate::links::Act;
+
+/// Number of channels whose values before SAFE are kept.
+const KEPT: usize = if KEEPS_OUTPUTS { CHANNELS } else { 0 };
 
 /// The points of one port.
 #[derive(Debug)]
@@ -21,6 +25,8 @@ pub struct IoPort {
     edges: [u32; CHANNELS],
     /// Uptime in ms at which a pulse of each digital output ends; 0 without a pulse.
     pulse_ends: [u32; CHANNELS],
+    /// What was commanded last, raw, of each output that is at SAFE since then.
+    before_safe: [Option<u16>; KEPT],
     /// The inputs have been scanned once. From then on a rising edge counts.
     scanned: bool,
     /// Channels that cannot be read or driven, channel 1 in bit 0.
@@ -39,6 +45,7 @@ impl IoPort {
             pulses: [0; CHANNELS],
             edges: [0; CHANNELS],
             pulse_ends: [0; CHANNELS],
+            before_safe: [None; KEPT],
             scanned: false,
             failing: 0,
         }
@@ -113,6 +120,19 @@ impl IoPort {
         if let Some(end) = self.pulse_ends.get_mut(channel) {
             *end = 0;
         }
+        self.forget_before_safe(channel);
+    }
+
+    /// Sets an analog output, in the unit of its SCALE.
+    pub(super) fn set_word(&mut self, channel: usize, word: u16) {
+        self.channels.set_word(channel, word);
+        self.forget_before_safe(channel);
+    }
+
+    fn forget_before_safe(&mut self, channel: usize) {
+        if let Some(before) = self.before_safe.get_mut(channel) {
+            *before = None;
+        }
     }
 
     /// Clears the outputs whose pulse ends at the uptime `now` in ms.
@@ -164,6 +184,22 @@ impl IoPort {
         }
     }
 
+    /// Returns what a master or a link commanded last of an output, not SAFE: 0 or 1 for a bit, 0 to 4095 raw for a word. A
+    /// pulse counts as ended.
+    pub(super) fn commanded(&self, channel: usize) -> u16 {
+        let before_safe = self.before_safe.get(channel).copied().flatten();
+        before_safe.unwrap_or_else(|| match (self.kind(channel), self.setting(channel)) {
+            (Kind::BitOutput, _) if self.pulse_ends.get(channel) == Some(&0) => {
+                self.channels.bit(channel).into()
+            }
+            (Kind::WordOutput, Some(settings)) => {
+                let word = self.channels.word(channel);
+                scale::output_to_raw(word, settings.signal, settings.scale).get()
+            }
+            _ => 0,
+        })
+    }
+
     /// Returns the value of a channel: 0 or 1 for a bit.
     pub(super) fn value(&self, channel: usize) -> u16 {
         match self.kind(channel) {
@@ -185,7 +221,11 @@ impl IoPort {
     pub fn go_safe(&mut self) {
         for (channel, safe) in self.safe.into_iter().enumerate() {
             if let Some(value) = safe {
+                let before = Some(self.commanded(channel));
                 self.command_raw(channel, value);
+                if let Some(place) = self.before_safe.get_mut(channel) {
+                    *place = before;
+                }
             }
         }
     }

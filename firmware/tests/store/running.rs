@@ -1,6 +1,6 @@
 //! The steps of a device's life that concern the store.
 
-use firmware::store::{Saving, Store, WriteError};
+use firmware::store::{Given, Saving, Store, WriteError};
 use register_map::board::MODIO_02;
 use register_map::configuration::{COMMAND, KEY, RULES, module_of};
 use register_map::{Module, rule_at};
@@ -36,10 +36,10 @@ pub fn save(
     flash: &mut MockFlash,
     settings: &Settings,
 ) -> Result<bool, Failure> {
-    let Some(mut saving) = Saving::new(store, flash, settings) else {
+    let Some(mut saving) = Saving::of_settings(store, flash, settings) else {
         return Ok(false);
     };
-    while let Some(operation) = saving.next(settings) {
+    while let Some(operation) = saving.next(flash, Given::Settings(settings)) {
         if let Err(failure) = operation.perform(flash) {
             // The error of the operation is more specific.
             let _ = saving.finish(store, flash);
