@@ -148,8 +148,7 @@ impl Saving {
     ) -> Result<(), WriteError<F::Error>> {
         store.survey_again(flash);
         let Writing { page, offset, .. } = self.writing;
-        let survey = store.survey(page);
-        if survey.clean && survey.end == offset {
+        if store.survey(page).end == offset {
             Ok(())
         } else {
             store.avoid(page);

@@ -4,6 +4,7 @@ extern crate std;
 
 mod edges;
 mod files;
+mod keeping;
 mod links;
 mod over_the_air;
 mod points;
