@@ -2,6 +2,7 @@
 
 use core::ops::Range;
 
+use register_map::points;
 use register_map::record::{OUTPUTS, Record, pair_of};
 
 use super::{Page, Pages};
@@ -36,12 +37,14 @@ impl Copied {
         }
     }
 
-    /// Returns the outputs of a record at this place.
+    /// Returns the outputs of a record at this place, at most as many as fit into a page with the largest settings.
     pub(super) fn outputs(record: &Record<'_>, page: Page, offset: usize) -> Self {
+        let settings = settings_of(record);
+        let outputs = record.count().saturating_sub(settings);
         Self {
             page,
             offset,
-            indices: settings_of(record)..record.count(),
+            indices: settings..settings.saturating_add(outputs.min(usize::from(points::COUNT))),
         }
     }
 

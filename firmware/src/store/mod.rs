@@ -17,6 +17,10 @@
 //!   +------+----------------------+   +------+---+-----------------------+
 //! ```
 //!
+//! The outputs that start as they were are pairs in the record of the settings, after these. When only they change, a
+//! record of outputs alone follows the settings. A save and a move to the other page copy the newest of them. So settings
+//! and outputs always change pages together, and a record of outputs stores no unsaved setting.
+//!
 //! Why a power cut during any operation does no harm:
 //!
 //! - A record counts once its first seal is programmed, after its CRC is complete. Until then the previous record

@@ -11,7 +11,7 @@ use super::{Newest, Page, Pages, Store, WriteError};
 use crate::KEEPS_OUTPUTS;
 use crate::config::Settings;
 
-/// What is to be stored.
+/// The values to store.
 #[derive(Clone, Copy, Debug)]
 pub enum Given<'a, const SLOTS: usize> {
     /// All settings.
@@ -62,7 +62,7 @@ impl Saving {
     }
 
     /// Begins a record of outputs: after the newest record if it fits there, or else on the other page together with the
-    /// stored settings. Returns `None` when these outputs are already stored, and when no settings are.
+    /// stored settings. Returns `None` when these outputs are already stored, and when no settings are or leave no room.
     #[must_use]
     pub fn of_outputs(store: &Store, flash: &impl Pages, outputs: &[(u16, u16)]) -> Option<Self> {
         let Newest {
@@ -87,6 +87,10 @@ impl Saving {
             let sequence = newest.sequence.wrapping_add(1);
             let count = count.saturating_add(stored.count());
             encoder = Encoder::new(record.schema, sequence, count);
+            // Those of a later firmware may fill the page.
+            if encoder.size() > flash.page(page).len().saturating_sub(FIRST_OFFSET) {
+                return None;
+            }
             place = self::place(store, encoder.size());
         }
         Some(Self::new(place, encoder, copied))

@@ -254,6 +254,22 @@ fn settings_that_only_a_later_firmware_knows_survive_records_and_starts() {
     assert!(kept.filter(|(address, _)| *address < OUTPUTS).eq(pairs));
 }
 
+#[test]
+fn settings_of_a_later_firmware_that_fill_a_page_leave_no_room_for_outputs() {
+    let pairs: Vec<_> = (0..PAGE_SIZE as u16 / 4 - 8)
+        .map(|n| (0x0500 + n, n))
+        .collect();
+    let mut page = [0xFF; PAGE_SIZE];
+    let size = encode_page(5, &pairs, &mut page).unwrap();
+    let mut flash = MockFlash::with(&page[..size], &[]);
+    let (_, mut store) = start_well(&mut flash);
+    assert!(record(&mut store, &mut flash, &outputs(0)).unwrap());
+    let before = flash.operations();
+    assert!(!record(&mut store, &mut flash, &outputs(3)).unwrap());
+    assert_eq!(flash.operations(), before);
+    assert_eq!(stored(&store, &flash), outputs(0));
+}
+
 /// The figures of docs/safety.md: erases of each page in 20 years with 80 records a day, each with other values, and
 /// without and with a start after each tenth record.
 #[test]
