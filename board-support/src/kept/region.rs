@@ -143,7 +143,7 @@ pub fn keep_records(left: u8) {
 /// Returns the number of records of outputs left, 255 after power-on.
 #[must_use]
 pub fn records() -> u8 {
-    (!read(FLAGS) >> 24) as u8
+    sealed::records_of(read(FLAGS))
 }
 
 /// Keeps bits of the flags, if they have changed.

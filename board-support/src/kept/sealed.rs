@@ -173,6 +173,11 @@ pub(super) const fn saves(left: u8) -> u32 {
     (!left as u32) << 16
 }
 
+/// Returns the number of records of outputs left from the flags, 255 after power-on.
+pub(super) const fn records_of(flags: u32) -> u8 {
+    (!flags >> 24) as u8
+}
+
 /// Returns the bits of a number of records of outputs left.
 pub(super) const fn records(left: u8) -> u32 {
     (!left as u32) << 24
@@ -311,6 +316,19 @@ mod tests {
         }
         let after = Sealed::after_power_on();
         assert_eq!((after.dip(), after.saves()), (None, u8::MAX));
+        assert_eq!(records_of(after.0[FLAGS]), u8::MAX);
+    }
+
+    #[test]
+    fn numbers_of_saves_and_of_records_left_are_kept_apart() {
+        let mut sealed = find(&in_service()).unwrap();
+        for left in [0, 80, 7] {
+            sealed.set(FLAGS, RECORDS, records(left));
+            assert_eq!((sealed.saves(), records_of(sealed.0[FLAGS])), (9, left));
+        }
+        sealed.set(FLAGS, SAVES, saves(20));
+        assert_eq!((sealed.saves(), records_of(sealed.0[FLAGS])), (20, 7));
+        assert_eq!(sealed.dip(), Some(17));
     }
 
     #[test]
