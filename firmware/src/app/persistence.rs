@@ -1,4 +1,4 @@
-//! Saves of the configuration by the background task, and restarts, which wait for a save.
+//! Saves of the configuration by the background task, records of outputs, and restarts, which wait for a save.
 //!
 //! While the supply is too low for the flash, a save waits, before its first operation or between two operations.
 //! It continues once the supply has recovered. Until then another save is rejected as busy.
@@ -28,6 +28,7 @@ pub struct Persistence {
     low: bool,
     /// The page that is no longer needed is to be erased.
     erase: bool,
+    /// When outputs that are to start as they were are stored.
     schedule: Schedule,
 }
 

@@ -1,53 +1,18 @@
 //! Records of outputs among saves, with power cuts at every possible place.
 
-use firmware::store::{Given, Operation, Saving, Store};
+use firmware::store::{Operation, Store};
 use register_map::board::MODIO_02;
 use register_map::record::{OUTPUTS, encode_page, records};
 
 use crate::PAGE_SIZE;
 use crate::flash::{MESSES, Mess, MockFlash};
 use crate::running::{
-    Failure, Loaded, Settings, fullest_settings, random_settings, save, settings, start_well,
+    Loaded, Outputs, Settings, fullest_settings, outputs, random_settings, record, save, settings,
+    start_well, stored,
 };
-
-/// Values of outputs, as pairs of a record.
-type Outputs = Vec<(u16, u16)>;
 
 /// Settings and outputs.
 type State = (Settings, Outputs);
-
-/// Records outputs as the firmware's background task does. Returns `false` when there was nothing to do.
-fn record(
-    store: &mut Store,
-    flash: &mut MockFlash,
-    outputs: &[(u16, u16)],
-) -> Result<bool, Failure> {
-    let Some(mut saving) = Saving::of_outputs(store, flash, outputs) else {
-        return Ok(false);
-    };
-    let given: Given<'_, 1> = Given::Outputs(outputs);
-    while let Some(operation) = saving.next(flash, given) {
-        if let Err(failure) = operation.perform(flash) {
-            let _ = saving.finish(store, flash);
-            return Err(failure);
-        }
-    }
-    saving.finish(store, flash)?;
-    Ok(true)
-}
-
-/// Returns the stored outputs.
-fn stored(store: &Store, flash: &MockFlash) -> Outputs {
-    let record = store.outputs(flash);
-    let pairs = record.iter().flat_map(|record| record.pairs());
-    pairs.filter(|(address, _)| *address >= OUTPUTS).collect()
-}
-
-/// Returns values of some outputs that differ from round to round.
-fn outputs(round: u16) -> Outputs {
-    let all = [0, 1, 2, 3].map(|point| (OUTPUTS + 0x0510 + point, round));
-    all[..1 + usize::from(round % 4)].to_vec()
-}
 
 /// Starts the device and returns what it finds.
 fn found(flash: &mut MockFlash) -> (State, Store) {
