@@ -13,12 +13,12 @@ impl<const SLOTS: usize> Device<SLOTS> {
     #[inline(never)]
     pub fn outputs(&self) -> Outputs {
         let mut outputs = Outputs::new();
-        for (slot, port) in self.points.ports().iter().enumerate() {
+        for slot in 0..SLOTS {
             for channel in 0..CHANNELS {
                 let Some(address) = self.kept_at(slot, channel) else {
                     continue;
                 };
-                let mut value = port.commanded(channel);
+                let mut value = self.points.commanded(slot * CHANNELS + channel);
                 if address & BITS != 0 {
                     value = (0x100 | value) << channel;
                 }

@@ -206,7 +206,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
             self.restart.get_or_insert(Restart::Update);
         }
         if tripped {
-            self.points.ports_mut().iter_mut().for_each(IoPort::go_safe);
+            self.points.go_safe();
         }
         tripped
     }

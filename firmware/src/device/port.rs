@@ -25,8 +25,8 @@ pub struct IoPort {
     edges: [u32; CHANNELS],
     /// Uptime in ms at which a pulse of each digital output ends; 0 without a pulse.
     pulse_ends: [u32; CHANNELS],
-    /// What was commanded last, raw, of each output that is at SAFE since then.
-    before_safe: [Option<u16>; KEPT],
+    /// What was commanded last, raw, of each output that was set to SAFE since then.
+    before_safe: [u16; KEPT],
     /// The inputs have been scanned once. From then on a rising edge counts.
     scanned: bool,
     /// Channels that cannot be read or driven, channel 1 in bit 0.
@@ -45,7 +45,7 @@ impl IoPort {
             pulses: [0; CHANNELS],
             edges: [0; CHANNELS],
             pulse_ends: [0; CHANNELS],
-            before_safe: [None; KEPT],
+            before_safe: [0; KEPT],
             scanned: false,
             failing: 0,
         }
@@ -120,19 +120,6 @@ impl IoPort {
         if let Some(end) = self.pulse_ends.get_mut(channel) {
             *end = 0;
         }
-        self.forget_before_safe(channel);
-    }
-
-    /// Sets an analog output, in the unit of its SCALE.
-    pub(super) fn set_word(&mut self, channel: usize, word: u16) {
-        self.channels.set_word(channel, word);
-        self.forget_before_safe(channel);
-    }
-
-    fn forget_before_safe(&mut self, channel: usize) {
-        if let Some(before) = self.before_safe.get_mut(channel) {
-            *before = None;
-        }
     }
 
     /// Clears the outputs whose pulse ends at the uptime `now` in ms.
@@ -146,10 +133,10 @@ impl IoPort {
     }
 
     /// Does what a link does to an output at the uptime `now` in ms. Nothing happens when a write of the output would be
-    /// rejected.
-    pub(super) fn act(&mut self, channel: usize, act: Act, now: u32) {
+    /// rejected: then returns false.
+    pub(super) fn act(&mut self, channel: usize, act: Act, now: u32) -> bool {
         if self.kind(channel) != Kind::BitOutput || self.failing >> (channel & 7) & 1 != 0 {
-            return;
+            return false;
         }
         self.set_output(channel, act.value);
         if act.pulse_ms > 0
@@ -158,6 +145,7 @@ impl IoPort {
             // 0 stands for no pulse.
             *end = now.wrapping_add(act.pulse_ms).max(1);
         }
+        true
     }
 
     /// Stores which channels cannot be read or driven, channel 1 in bit 0.
@@ -184,11 +172,9 @@ impl IoPort {
         }
     }
 
-    /// Returns what a master or a link commanded last of an output, not SAFE: 0 or 1 for a bit, 0 to 4095 raw for a word. A
-    /// pulse counts as ended.
+    /// Returns what an output is commanded: 0 or 1 for a bit, 0 to 4095 raw for a word. A pulse counts as ended.
     pub(super) fn commanded(&self, channel: usize) -> u16 {
-        let before_safe = self.before_safe.get(channel).copied().flatten();
-        before_safe.unwrap_or_else(|| match (self.kind(channel), self.setting(channel)) {
+        match (self.kind(channel), self.setting(channel)) {
             (Kind::BitOutput, _) if self.pulse_ends.get(channel) == Some(&0) => {
                 self.channels.bit(channel).into()
             }
@@ -197,7 +183,12 @@ impl IoPort {
                 scale::output_to_raw(word, settings.signal, settings.scale).get()
             }
             _ => 0,
-        })
+        }
+    }
+
+    /// Returns what was commanded, raw, before the output was set to SAFE.
+    pub(super) fn before_safe(&self, channel: usize) -> u16 {
+        self.before_safe.get(channel).copied().unwrap_or_default()
     }
 
     /// Returns the value of a channel: 0 or 1 for a bit.
@@ -217,17 +208,16 @@ impl IoPort {
         range.unwrap_or_default() / 256
     }
 
-    /// Sets the outputs to SAFE.
-    pub fn go_safe(&mut self) {
-        for (channel, safe) in self.safe.into_iter().enumerate() {
-            if let Some(value) = safe {
-                let before = Some(self.commanded(channel));
-                self.command_raw(channel, value);
-                if let Some(place) = self.before_safe.get_mut(channel) {
-                    *place = before;
-                }
-            }
+    /// Sets an output to SAFE, and keeps what was commanded `before`. Returns false when SAFE holds the output.
+    pub(super) fn go_safe(&mut self, channel: usize, before: u16) -> bool {
+        let Some(value) = self.safe.get(channel).copied().flatten() else {
+            return false;
+        };
+        if let Some(place) = self.before_safe.get_mut(channel) {
+            *place = before;
         }
+        self.command_raw(channel, value);
+        true
     }
 
     /// Returns the state of the module.

@@ -116,7 +116,7 @@ fn commanded_values_are_kept_while_outputs_are_at_safe() {
 
 #[test]
 fn a_link_is_kept_and_a_pulse_is_not() {
-    let mut bench = keeping(&[]);
+    let mut bench = keeping(&[(at::COMM_TIMEOUT, 5)]);
     bench.unlock();
     for (point, input, action) in [(0, 12, LinkAction::Toggle), (1, 13, LinkAction::Pulse)] {
         let link = [input, action.code(), 10, 0];
@@ -129,6 +129,16 @@ fn a_link_is_kept_and_a_pulse_is_not() {
     });
     assert_eq!(bench.values().0, 0b0011);
     assert_eq!(bench.device.outputs()[0], (0xE280, 0x0B01));
+    // A link counts as well after SAFE.
+    bench.device.request_seen(0, false);
+    assert!(bench.device.tick(500));
+    assert_eq!(bench.values().0, 0);
+    assert_eq!(bench.device.outputs()[0], (0xE280, 0x0B01));
+    for _ in 0..2 {
+        bench.scan_port(3, |channels| channels.set_bit(0, false));
+        bench.scan_port(3, |channels| channels.set_bit(0, true));
+    }
+    assert_eq!(bench.device.outputs()[0], (0xE280, 0x0B00));
 }
 
 #[test]
