@@ -199,7 +199,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
 
     /// Writes bit points that the check has accepted.
     pub fn write_bits(&mut self, span: Span, bits: Bits<'_>) {
-        self.leave_safe(self.index(span.start()), span.count());
+        self.leave_safe(span);
         for (index, bit) in self.indices(span).zip(bits.iter()) {
             if let Some((port, channel)) = self.place_mut(index) {
                 port.set_output(channel, bit);
@@ -209,7 +209,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
 
     /// Writes word points that the check has accepted.
     pub fn write_words(&mut self, span: Span, words: Words<'_>) {
-        self.leave_safe(self.index(span.start()), span.count());
+        self.leave_safe(span);
         for (index, word) in self.indices(span).zip(words.iter()) {
             if let Some((port, channel)) = self.place_mut(index) {
                 port.channels.set_word(channel, word);
@@ -221,7 +221,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
     pub(super) fn act(&mut self, slot: usize, channel: usize, act: Act, now: u32) {
         let port = self.ports.get_mut(slot);
         if port.is_some_and(|port| port.act(channel, act, now)) {
-            self.leave_safe(slot * CHANNELS + channel, 1);
+            self.leave_safe_now(slot * CHANNELS + channel, 1);
         }
     }
 
@@ -254,10 +254,18 @@ impl<const SLOTS: usize> Points<SLOTS> {
         })
     }
 
-    /// Marks points as commanded, so that they are no longer at SAFE: all points of a request together, because that takes
-    /// fewer instructions.
+    /// Marks points as commanded, so that they are no longer at SAFE.
+    #[inline(always)]
+    fn leave_safe(&mut self, span: Span) {
+        // Most requests end here, after a few instructions.
+        if self.at_safe.iter().any(|at_safe| *at_safe != 0) {
+            self.leave_safe_now(self.index(span.start()), span.count());
+        }
+    }
+
+    #[cold]
     #[inline(never)]
-    fn leave_safe(&mut self, index: usize, count: u16) {
+    fn leave_safe_now(&mut self, index: usize, count: u16) {
         for at_safe in &mut self.at_safe {
             // `count` is at least 1, and the points are within the 32.
             let points = u32::MAX >> ((32 - u32::from(count)) & 31) << (index & 31);
