@@ -241,10 +241,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
     /// Returns what a master or a link commanded last of the output with this index, not SAFE: 0 or 1 for a bit, 0 to 4095
     /// raw for a word. A pulse counts as ended.
     pub(super) fn commanded(&self, index: usize) -> u16 {
-        let is_safe = self
-            .at_safe
-            .iter()
-            .any(|bits| bits >> (index & 31) & 1 != 0);
+        let is_safe = self.at_safe() >> (index & 31) & 1 != 0;
         self.place(index).map_or(0, |(port, channel)| {
             if is_safe {
                 port.before_safe(channel)
@@ -254,11 +251,17 @@ impl<const SLOTS: usize> Points<SLOTS> {
         })
     }
 
+    /// Returns the outputs that are at SAFE and were not commanded since.
+    #[inline(always)]
+    fn at_safe(&self) -> u32 {
+        self.at_safe.first().copied().unwrap_or_default()
+    }
+
     /// Marks points as commanded, so that they are no longer at SAFE.
     #[inline(always)]
     fn leave_safe(&mut self, span: Span) {
         // Most requests end here, after a few instructions.
-        if self.at_safe.iter().any(|at_safe| *at_safe != 0) {
+        if self.at_safe() != 0 {
             self.leave_safe_now(self.index(span.start()), span.count());
         }
     }
