@@ -7,10 +7,14 @@
 /// The device serves function 70.
 pub const HAS_EVENTS: bool = !cfg!(feature = "small");
 
+/// The device keeps the values of outputs that are to start as they were.
+pub const KEEPS_OUTPUTS: bool = !cfg!(feature = "small");
+
 /// The board has slots, a switch and a radio: nothing about it is fixed.
 pub const HAS_SLOTS: bool = cfg!(feature = "slots");
 
 pub mod alive;
+pub mod budget;
 mod built;
 pub mod byte_queue;
 pub mod config;
@@ -18,6 +22,7 @@ pub mod device;
 pub mod leds;
 pub mod line;
 pub mod links;
+pub mod outputs;
 pub mod radio;
 pub mod repairs;
 pub mod start_up;

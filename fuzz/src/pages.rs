@@ -3,7 +3,7 @@
 use std::fmt;
 
 use register_map::board::MODIO_02;
-use register_map::record::{BEGINNING, SEALS};
+use register_map::record::{BEGINNING, OUTPUTS, SEALS};
 
 use crate::PAGE_SIZE;
 use crate::running::{Settings, random_settings};
@@ -54,7 +54,10 @@ fn record(script: &mut Script<'_>, base: u32) -> Vec<u8> {
             let settings = random_settings(u64::from(seed), usize::from(size));
             settings.changed_from(0).collect()
         }
-        count => (0..count).map(|_| (script.half(), script.half())).collect(),
+        // No addresses of outputs, which are recorded by events only.
+        count => (0..count)
+            .map(|_| (script.half() % OUTPUTS, script.half()))
+            .collect(),
     };
     let mut record = b"mo\x01\x01".to_vec();
     record.extend(sequence.to_le_bytes());

@@ -2,7 +2,7 @@
 //! power cut in any operation that leaves any mess, a worn half-word.
 //!
 //! Every start must find what was saved last or, after a power cut in a save, the old or the new configuration,
-//! complete. The mock flash of firmware's tests refuses any programming that RM0008 3.3 does not allow. At the end,
+//! complete, and in the same way the outputs that were recorded last. The mock flash of firmware's tests refuses any programming that RM0008 3.3 does not allow. At the end,
 //! unless the flash is worn, a save works immediately and without an erase, and the next start finds it.
 //!
 //! ```text
@@ -11,6 +11,7 @@
 //!           2 a start                          3 a cut      number of operations before it, mess
 //!           4 erase the spare page             5 wear       place (2 bytes; top bit: second page)
 //!           6 save of two settings  4 bytes    7 save of what is stored
+//!           8 a record of outputs   round
 //! ```
 
 use firmware::store::{Page, Store, WriteError};
@@ -19,7 +20,9 @@ use register_map::board::MODIO_02;
 use crate::PAGE_SIZE;
 use crate::flash::{Fault, Mess, MockFlash};
 use crate::pages::{self, Found};
-use crate::running::{Loaded, Settings, fullest_settings, random_settings, save};
+use crate::running::{
+    Loaded, Outputs, Settings, fullest_settings, outputs, random_settings, record, save, stored,
+};
 use crate::script::Script;
 
 /// Enough events to fill both pages several times.
@@ -32,13 +35,20 @@ pub fn run(input: &[u8]) {
     let pages = [0; 2].map(|_| pages::page(&mut script, base));
     let mut life = Life {
         expected: pages::read(&pages),
+        outputs: vec![Outputs::new()],
         flash: MockFlash::holding(pages),
         store: None,
         refusals: 0,
     };
     for _ in 0..MOST_EVENTS {
         let Some(tag) = script.tag() else { break };
-        life.event(tag & 7, &mut script);
+        life.event(
+            match tag & 15 {
+                8 => 8,
+                _ => tag & 7,
+            },
+            &mut script,
+        );
     }
     life.must_go_on();
 }
@@ -47,6 +57,8 @@ struct Life {
     flash: MockFlash,
     /// Configurations that the next start may find.
     expected: Vec<Found>,
+    /// Stored outputs that the next start may find.
+    outputs: Vec<Outputs>,
     /// The store while the power is on.
     store: Option<Store>,
     /// Number of operations that the flash refused.
@@ -92,6 +104,7 @@ impl Life {
                 let [a, b] = [0; 2].map(|_| (0x0100 | u16::from(script.byte()), script.half()));
                 self.save(&Settings::load(&MODIO_02, [a, b].into_iter()).0);
             }
+            8 => self.record(&outputs(script.byte().into())),
             _ => {
                 self.start();
                 let stored = self.expected[0].settings;
@@ -121,9 +134,12 @@ impl Life {
             // An interrupted start selects no configuration.
             self.check(store.load(&MODIO_02, &self.flash));
             let prepared = store.prepare(&mut self.flash);
+            let outputs = stored(&store, &self.flash);
+            assert!(self.outputs.contains(&outputs), "found {outputs:?}");
             if prepared.is_ok() {
                 let found = self.check(store.load(&MODIO_02, &self.flash));
                 self.decide(found);
+                self.outputs = vec![outputs];
             }
             self.store = Some(store);
             self.handle(Some(prepared));
@@ -178,6 +194,19 @@ impl Life {
             Err(_) => self.expected.push(Found::good(settings)),
         }
         self.handle(Some(saved));
+    }
+
+    fn record(&mut self, outputs: &Outputs) {
+        self.start();
+        let Some(store) = &mut self.store else { return };
+        let recorded = record(store, &mut self.flash, outputs);
+        match recorded {
+            Ok(true) => self.outputs = vec![outputs.clone()],
+            Ok(false) => {}
+            // The record already counts when the second seal is worn out.
+            Err(_) => self.outputs.push(outputs.clone()),
+        }
+        self.handle(Some(recorded));
     }
 
     /// Checks that the device still works after all events.

@@ -115,7 +115,7 @@ const ROWS: [Row; 5] = [
             part: STM32F103RC,
             smaller: None,
             stack: 11 * KIB,
-            budget: [63 * KIB, 14 * KIB],
+            budget: [65 * KIB, 14 * KIB],
             interrupts: ["USART1", "USART3", "EXTI3"],
         },
     },
@@ -279,13 +279,21 @@ impl Board {
     pub fn registers(&self) -> impl Iterator<Item = (&'static Rule, &'static Text)> {
         let blocks = BLOCKS.iter().skip(1);
         let registers = blocks.flat_map(|block| block.registers());
-        registers.filter(|(rule, _)| self.has(rule.first))
+        let registers = registers.filter(|(rule, _)| self.has(rule.first));
+        registers.map(|register| match register.0.first {
+            configuration::START if self.is_small() => {
+                let (rule, text) = &configuration::PLAIN_START;
+                (rule, text)
+            }
+            _ => register,
+        })
     }
 
-    /// Returns whether the firmware of the board serves function 70. The flash of the smallest parts has no room for it.
+    /// Returns whether the firmware of the board leaves out function 70, DEADBAND and START = as it was, for which the flash
+    /// of the smallest parts has no room: feature `small`.
     #[must_use]
-    pub const fn reports_events(&self) -> bool {
-        self.memory().part.flash > 128 * KIB
+    pub const fn is_small(&self) -> bool {
+        self.memory().part.flash <= 128 * KIB
     }
 
     /// Returns whether the board has a register, which every board has or every board of some kind. Links exist only for
@@ -295,7 +303,7 @@ impl Board {
         match address {
             configuration::UNIT => !self.switch,
             configuration::LORA..=configuration::LORA_FRAME_GAP => self.radio,
-            _ if deadband::contain(address) => self.reports_events(),
+            _ if deadband::contain(address) => !self.is_small(),
             _ => links::exist(self.slots as usize) || !links::contain(address),
         }
     }
@@ -413,6 +421,20 @@ mod tests {
         let slots = |board: &Board| (0..10).filter(|port| board.has_slot(*port)).count();
         assert_eq!((slots(&MODIO_02), slots(&MODIO_08)), (1, 4));
         assert!(MODIO_02.ports().eq([5]) && MODIO_08.ports().eq(1..=4));
+    }
+
+    #[test]
+    fn start_as_it_was_exists_on_boards_that_keep_outputs() {
+        for board in Board::ALL {
+            let start = |(rule, _): &(&Rule, &Text)| rule.first == configuration::START;
+            let (rule, text) = board.registers().find(start).unwrap();
+            let kinds = [Kind::BitOutput, Kind::WordOutput];
+            let allowed = kinds.map(|kind| rule.values_for(kind).allow(configuration::AS_IT_WAS));
+            assert_eq!(allowed, [!board.is_small(); 2], "{board}");
+            assert_eq!(text.about.contains("as it was"), !board.is_small());
+            assert_eq!((text.name, rule.count), ("START", 32));
+        }
+        assert!(!MODIO_08.is_small() && MODIO_02.is_small());
     }
 
     #[test]

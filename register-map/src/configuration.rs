@@ -1,7 +1,6 @@
 //! The configuration, 0x0100 to 0x01FF: holding registers protected by a lock.
 
-use crate::Module;
-use crate::block::block;
+use crate::block::{Text, block};
 use crate::codes::{
     AirRate, Baud, CommSource, Command, Format, GapRule, Lora, Mode, Power, Scale, Signal,
 };
@@ -13,6 +12,7 @@ use crate::limits::{
 use crate::rule::{Narrower, Rule};
 use crate::value::{Unit, Value};
 use crate::values::Values;
+use crate::{Module, points};
 
 /// Value of KEY that opens the lock.
 pub const OPENING_KEY: u16 = 0x5A17;
@@ -26,17 +26,35 @@ pub const SAVES: u8 = 20;
 /// Time after which a unit may write one more save, in seconds.
 pub const SAVE_EVERY_S: u32 = 60;
 
+/// Number of records of outputs that a unit may write to its flash one after another, and in a day.
+pub const RECORDS: u8 = 80;
+
+/// Time after which a unit may write one more record of outputs, in seconds.
+pub const RECORD_EVERY_S: u32 = 24 * 3600 / RECORDS as u32;
+
+/// Least time between two records of outputs, in seconds.
+pub const RECORD_AFTER_S: u32 = 10;
+
 /// Value of SAFE that leaves an output unchanged.
 pub const HOLD: u16 = 0xFFFF;
 
+/// Value of START by which an output starts with the value that a master or a link commanded last.
+pub const AS_IT_WAS: u16 = 0xFFFE;
+
 const SAFE_OF_A_BIT: Narrower = Narrower::new(BitOutput, Values::up_to(1).or(HOLD), 0);
-const START_OF_A_BIT: Narrower = Narrower::new(BitOutput, Values::up_to(1), 0);
+const START_OF_A_BIT: Narrower = Narrower::new(BitOutput, Values::up_to(1).or(AS_IT_WAS), 0);
+const PLAIN_START_OF_A_BIT: Narrower = Narrower::new(BitOutput, Values::up_to(1), 0);
 const FILTER_OF_A_WORD: Narrower =
     Narrower::new(WordInput, Values::up_to(LOW_PASS_MAX), LOW_PASS_DEFAULT);
 const RANGE_OF_AN_OUTPUT: Narrower = Narrower::new(WordOutput, Values::up_to(1), 0);
 
 const SAFE_RULE: Rule = Rule::now(Values::up_to(RAW_MAX).or(HOLD), 0).but(&SAFE_OF_A_BIT);
-const START_RULE: Rule = Rule::restart(Values::up_to(RAW_MAX), 0).but(&START_OF_A_BIT);
+const START_RULE: Rule = if cfg!(feature = "small") {
+    PLAIN_START_RULE
+} else {
+    Rule::restart(Values::up_to(RAW_MAX).or(AS_IT_WAS), 0).but(&START_OF_A_BIT)
+};
+const PLAIN_START_RULE: Rule = Rule::restart(Values::up_to(RAW_MAX), 0).but(&PLAIN_START_OF_A_BIT);
 const FILTER_RULE: Rule =
     Rule::now(Values::up_to(DEBOUNCE_MAX_MS), DEBOUNCE_DEFAULT_MS).but(&FILTER_OF_A_WORD);
 const RANGE_RULE: Rule = Rule::now(Values::up_to(2), 0).but(&RANGE_OF_AN_OUTPUT);
@@ -99,9 +117,20 @@ block! {
     SCALE "SCALE": 0x01A0 x 32, Value::Codes(Scale::NAMES), Rule::now(Values::up_to(1), 0);
     /// Output while the line is silent, raw; 0xFFFF = hold
     SAFE "SAFE": 0x01C0 x 32, Value::NUMBER, SAFE_RULE;
-    /// Output at power-on, raw
+    /// Output at power-on, raw; 0xFFFE = as it was
     START "START": 0x01E0 x 32, Value::NUMBER, START_RULE;
 }
+
+/// START of a board whose firmware does not keep outputs: without [`AS_IT_WAS`].
+pub(crate) static PLAIN_START: (Rule, Text) = (
+    PLAIN_START_RULE.at(START, points::COUNT),
+    Text {
+        name: "START",
+        value: Value::NUMBER,
+        narrower: None,
+        about: " Output at power-on, raw",
+    },
+);
 
 /// MODULE of a port, 1 to 8.
 #[inline]
@@ -126,14 +155,13 @@ pub fn modules<P: Into<u16>>(
 #[inline]
 #[must_use]
 pub fn point_of(address: u16) -> Option<u16> {
-    let run = address & !(crate::points::COUNT - 1);
+    let run = address & !(points::COUNT - 1);
     matches!(run, FILTER | BETA | RANGE | SCALE | SAFE | START).then_some(address.wrapping_sub(run))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::points;
 
     #[test]
     fn point_of_returns_the_point_of_a_setting() {

@@ -83,7 +83,7 @@ const CONFIGURATION: &[Expected] = &[
     (0x0180, 32, &[0, 2], &[3], 0, NOW),
     (0x01A0, 32, &[0, 1], &[2], 0, NOW),
     (0x01C0, 32, &[0, 4095, 0xFFFF], &[4096, 0xFFFE], 0, NOW),
-    (0x01E0, 32, &[0, 4095], &[4096, 0xFFFE, 0xFFFF], 0, RESTART),
+    (0x01E0, 32, &[0, 4095, 0xFFFE], &[4096, 0xFFFD, 0xFFFF], 0, RESTART),
 ];
 
 #[test]

@@ -45,6 +45,8 @@ const CONFIGURATION_NOTES: &str = "
   lock.
 - Twenty saves are possible one after another, and then one a minute; between them a save is exception 06. A save that
   writes nothing is always possible and does not count. The number of saves left survives every reset but a power-on.
+- START = 0xFFFE, *as it was*, exists on boards with more than 128 KiB of flash: not on the modio-02 and the eth-io5r,
+  where it is exception 03. [safety.md](safety.md#outputs-as-they-were) says which value an output then has.
 - A broadcast over the air writes nothing here: it is exception 06, which is not sent. With LORA 2 no write over the air
   is accepted here at all, and neither the clearing of pulse counters nor function 08 except 00, 02 and 0B-12.
 - FRAME_GAP counts as 1.5 characters when it is shorter than that at the rate in force.

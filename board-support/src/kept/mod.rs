@@ -32,8 +32,8 @@ pub(crate) use loading::{at_loading, keep_chosen};
 pub(crate) use region::{at_start, forget, keep_dip, take_as_255, take_cause};
 #[cfg(target_os = "none")]
 pub use region::{
-    end_choice, keep_as_255, keep_asked, keep_pulses, keep_recovery, keep_saves, keep_uptime,
-    marks, note, pulses,
+    end_choice, keep_as_255, keep_asked, keep_pulses, keep_records, keep_recovery, keep_saves,
+    keep_uptime, marks, note, pulses, records,
 };
 
 /// Words of one copy of the sealed part: 11 words, room for fields to come, and the CRC-32.

@@ -14,8 +14,8 @@ use core::{
 use super::{
     COPY, MARKS, PULSES, UPTIME, WORDS, live,
     sealed::{
-        self, AS_255, ASKED, CAUSE, CHOSEN, DEVELOPMENT, DIP, FLAGS, FRESH, HAS_DIP, SAVES,
-        STARTED, Sealed, UNSEEN,
+        self, AS_255, ASKED, CAUSE, CHOSEN, DEVELOPMENT, DIP, FLAGS, FRESH, HAS_DIP, RECORDS,
+        SAVES, STARTED, Sealed, UNSEEN,
     },
 };
 use crate::fault::{ENDED, Fault, Kind, TASKS};
@@ -132,9 +132,24 @@ pub fn keep_recovery() {
 
 /// Keeps the number of saves that the firmware may still write to flash. For the background task.
 pub fn keep_saves(left: u8) {
-    let saves = sealed::saves(left);
-    if read(FLAGS) & SAVES != saves {
-        update(None, FLAGS, SAVES, saves);
+    keep(SAVES, sealed::saves(left));
+}
+
+/// Keeps the number of records of outputs that the firmware may still write to flash. For the background task.
+pub fn keep_records(left: u8) {
+    keep(RECORDS, sealed::records(left));
+}
+
+/// Returns the number of records of outputs left, 255 after power-on.
+#[must_use]
+pub fn records() -> u8 {
+    sealed::records_of(read(FLAGS))
+}
+
+/// Keeps bits of the flags, if they have changed.
+fn keep(mask: u32, bits: u32) {
+    if read(FLAGS) & mask != bits {
+        update(None, FLAGS, mask, bits);
     }
 }
 

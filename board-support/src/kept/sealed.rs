@@ -15,7 +15,8 @@ const COUNT: usize = 2;
 const PLACE: usize = 3;
 /// Word of the uptime at the fault.
 const UPTIME: usize = 7;
-/// Word of SW01 (bits 0 to 7), the number of saves left (bits 16 to 23, inverted), and the bits below.
+/// Word of SW01 (bits 0 to 7), the numbers of saves and of records of outputs left (bits 16 to 23 and 24 to 31, inverted),
+/// and the bits below.
 pub(super) const FLAGS: usize = 8;
 /// Word of the seconds from power-on to the last start.
 pub(super) const STARTED: usize = 9;
@@ -46,6 +47,8 @@ pub(super) const CHOSEN: u32 = 0b11 << 11;
 pub(super) const FRESH: u32 = 1 << 10;
 /// The number of saves left.
 pub(super) const SAVES: u32 = 0x00FF_0000;
+/// The number of records of outputs left.
+pub(super) const RECORDS: u32 = 0xFF00_0000;
 
 /// What a reset keeps and what seldom changes.
 ///
@@ -168,6 +171,16 @@ impl Sealed {
 /// Returns the bits of a number of saves left.
 pub(super) const fn saves(left: u8) -> u32 {
     (!left as u32) << 16
+}
+
+/// Returns the number of records of outputs left from the flags, 255 after power-on.
+pub(super) const fn records_of(flags: u32) -> u8 {
+    (!flags >> 24) as u8
+}
+
+/// Returns the bits of a number of records of outputs left.
+pub(super) const fn records(left: u8) -> u32 {
+    (!left as u32) << 24
 }
 
 /// Returns the CRC-32 that the part's CRC unit computes (RM0008 4): polynomial 04C11DB7, start FFFFFFFF, not
@@ -303,6 +316,19 @@ mod tests {
         }
         let after = Sealed::after_power_on();
         assert_eq!((after.dip(), after.saves()), (None, u8::MAX));
+        assert_eq!(records_of(after.0[FLAGS]), u8::MAX);
+    }
+
+    #[test]
+    fn numbers_of_saves_and_of_records_left_are_kept_apart() {
+        let mut sealed = find(&in_service()).unwrap();
+        for left in [0, 80, 7] {
+            sealed.set(FLAGS, RECORDS, records(left));
+            assert_eq!((sealed.saves(), records_of(sealed.0[FLAGS])), (9, left));
+        }
+        sealed.set(FLAGS, SAVES, saves(20));
+        assert_eq!((sealed.saves(), records_of(sealed.0[FLAGS])), (20, 7));
+        assert_eq!(sealed.dip(), Some(17));
     }
 
     #[test]

@@ -26,6 +26,7 @@ pub type Settings = firmware::config::Settings<{ boards::SLOTS }>;
 const _: () = {
     assert!(BOARD.slots as usize == boards::SLOTS);
     assert!(BOARD.switch == matches!(boards::BOARD.address, AddressPins::Switch(_)));
+    assert!(BOARD.is_small() == cfg!(feature = "small"));
     assert!(BOARD.radio == boards::BOARD.radio.is_some());
     assert!(BOARD.fixed.is_empty() == boards::BOARD.has_slots());
     let mut port = 0;

@@ -1,12 +1,14 @@
-//! Saves of the configuration by the background task, and restarts, which wait for a save.
+//! Saves of the configuration by the background task, records of outputs, and restarts, which wait for a save.
 //!
 //! While the supply is too low for the flash, a save waits, before its first operation or between two operations.
 //! It continues once the supply has recovered. Until then another save is rejected as busy.
 
-use board_support::{Flash, flash::FlashError, kept};
+use board_support::{Flash, boards::SLOTS, flash::FlashError, kept};
 use firmware::{
+    KEEPS_OUTPUTS,
     device::Restart,
-    store::{Operation, Saving, Store, WriteError},
+    outputs::Schedule,
+    store::{Given, Operation, Saving, Store, WriteError},
 };
 use rtic::Mutex;
 
@@ -26,6 +28,8 @@ pub struct Persistence {
     low: bool,
     /// The page that is no longer needed is to be erased.
     erase: bool,
+    /// When outputs that are to start as they were are stored.
+    schedule: Schedule,
 }
 
 impl Persistence {
@@ -38,6 +42,7 @@ impl Persistence {
             refused: None,
             low: false,
             erase,
+            schedule: Schedule::new(if KEEPS_OUTPUTS { kept::records() } else { 0 }),
         }
     }
 
@@ -46,6 +51,12 @@ impl Persistence {
     pub fn work(&mut self, device: &mut impl Mutex<T = &'static mut Device>) -> Option<Event> {
         let save = device.lock(|device| device.config.is_saving());
         let event = if save { self.save(device) } else { None };
+        if KEEPS_OUTPUTS && !save {
+            let now = device.lock(|device| device.state.millis());
+            if self.schedule.is_due(now) {
+                self.record(device);
+            }
+        }
         // Under the lock, so that no save is ordered in between.
         device.lock(|device| match device.restart {
             Some(restart) if !device.config.has_save() => {
@@ -83,6 +94,36 @@ impl Persistence {
         }
     }
 
+    /// Stores the outputs that are to start as they were, if they are not stored already. Unlike a save, a record that the
+    /// flash refuses is not continued: another one is written at the next time.
+    // Not inlined, so that the copy is on the stack during a record only.
+    #[inline(never)]
+    fn record(&mut self, device: &mut impl Mutex<T = &'static mut Device>) {
+        let outputs = device.lock(|device| device.outputs());
+        let saving = if outputs.is_empty() || !self.pages.has_supply() {
+            None
+        } else {
+            Saving::of_outputs(&self.store, &self.pages, &outputs)
+        };
+        if saving.is_some() {
+            self.schedule.take();
+        }
+        // Before the first operation, so that a reset does not lose the number.
+        kept::keep_records(self.schedule.left());
+        let Some(mut saving) = saving else {
+            return;
+        };
+        let given: Given<'_, SLOTS> = Given::Outputs(&outputs);
+        while let Some(operation) = saving.next(&self.pages, given) {
+            if operation.perform(&mut self.pages).is_err() {
+                break;
+            }
+        }
+        // A record that is not complete does not count.
+        let _ = saving.finish(&mut self.store, &self.pages);
+        self.erase = !self.store.has_spare();
+    }
+
     // Not inlined, so that the copy is on the stack during a save only.
     #[inline(never)]
     fn save(&mut self, device: &mut impl Mutex<T = &'static mut Device>) -> Option<Event> {
@@ -92,7 +133,7 @@ impl Persistence {
         let mut saving = match self.saving.take() {
             Some(saving) => saving,
             None => {
-                let Some(saving) = Saving::new(&self.store, &self.pages, &settings) else {
+                let Some(saving) = Saving::of_settings(&self.store, &self.pages, &settings) else {
                     // These settings are already stored, so nothing is written and the flash does not wear.
                     Self::end(&settings, device);
                     return None;
@@ -110,7 +151,12 @@ impl Persistence {
         if !self.pages.has_supply() {
             return self.wait(saving);
         }
-        while let Some(operation) = self.refused.take().or_else(|| saving.next(&settings)) {
+        let given = Given::Settings(&settings);
+        while let Some(operation) = self
+            .refused
+            .take()
+            .or_else(|| saving.next(&self.pages, given))
+        {
             match operation.perform(&mut self.pages) {
                 Ok(()) => {}
                 Err(WriteError::Flash(FlashError::LowSupply)) => {

@@ -8,7 +8,7 @@ use board_support::{
 };
 use cortex_m::peripheral::SCB;
 use firmware::{
-    HAS_EVENTS,
+    HAS_EVENTS, KEEPS_OUTPUTS,
     config::{self, Config, LineConfig, RadioConfig},
     device::Identity,
     leds::{Leds, Trouble},
@@ -123,6 +123,9 @@ pub fn up(
         build: build(board.development),
     };
     let device = Device::new_in(place, config, identity, DESCRIPTION);
+    if KEEPS_OUTPUTS && let Some(outputs) = store.outputs(&pages) {
+        device.restore(&outputs);
+    }
     let updating = Updating::new(&mut pages, board.crc);
     device.update = updating.update(&mut pages, board.chosen);
     for (slot, port) in device.points.ports_mut().iter_mut().enumerate() {

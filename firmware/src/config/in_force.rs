@@ -5,6 +5,7 @@ use register_map::codes::{Format, GapRule, Mode};
 use register_map::configuration as at;
 
 use super::Settings;
+use crate::KEEPS_OUTPUTS;
 
 /// Settings of the RS-485 line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,7 +87,8 @@ pub struct Point {
     /// Change of an analog input that is an event, in its unit; 0 for 1/256 of its range.
     #[cfg(not(feature = "small"))]
     pub deadband: u16,
-    /// Output at power-on: 0 or 1 for a bit, 0 to 4095 raw for a word.
+    /// Output at power-on: 0 or 1 for a bit, 0 to 4095 raw for a word. 0 for an output that is to start as it was, until
+    /// its value is restored.
     pub start: u16,
 }
 
@@ -104,7 +106,10 @@ impl Point {
             safe: Some(get(at::SAFE)).filter(|safe| *safe != at::HOLD),
             #[cfg(not(feature = "small"))]
             deadband: get(register_map::deadband::DEADBAND),
-            start: get(at::START),
+            start: match get(at::START) {
+                at::AS_IT_WAS if KEEPS_OUTPUTS => 0,
+                start => start,
+            },
         }
     }
 }

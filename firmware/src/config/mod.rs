@@ -21,7 +21,6 @@ mod in_force;
 mod links;
 mod lock;
 mod origin;
-mod saves;
 mod settings;
 
 #[cfg(test)]
@@ -32,19 +31,19 @@ use core::array;
 use modbus_server::{Exception, Span, Words, WordsOut};
 use register_map::codes::{CommSource, Command, Lora};
 use register_map::configuration::{
-    COMM_SOURCE, COMM_TIMEOUT, COMMAND, FILTER, FORMAT, KEY, LORA, LORA_FRAME_GAP, MODE, MODULE,
-    RANGE, RESPONSE_DELAY, RULES, SAVES, SERIAL_LOW, UNIT,
+    AS_IT_WAS, COMM_SOURCE, COMM_TIMEOUT, COMMAND, FILTER, FORMAT, KEY, LORA, LORA_FRAME_GAP, MODE,
+    MODULE, RANGE, RESPONSE_DELAY, RULES, SAVE_EVERY_S, SAVES, SERIAL_LOW, START, UNIT,
 };
 use register_map::state::status;
 use register_map::{Board, Module, Run, Runs, links as links_map, runs};
 use register_map::{deadband, points};
 
 use crate::HAS_SLOTS;
+use crate::budget::Budget;
 pub use in_force::{LineConfig, Point, RadioConfig};
 use links::Links;
 use lock::Lock;
 pub use origin::{LineName, Origin};
-use saves::Saves;
 pub use settings::RestartValues;
 use settings::{
     RESTARTS, format_suits_mode, has_deadband, port_of, restart_addresses, takes_module,
@@ -88,7 +87,7 @@ pub struct Config<const SLOTS: usize> {
     save: Save,
     /// The flash does not hold `saved`, because the stored configuration was invalid at the start.
     unstored: bool,
-    saves: Saves,
+    saves: Budget<SAVES, SAVE_EVERY_S>,
     lock: Lock,
     /// Origin of the request that is being served.
     origin: Origin,
@@ -129,7 +128,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
             differences: 0,
             save: Save::None,
             unstored: invalid,
-            saves: Saves::new(SAVES),
+            saves: Budget::new(SAVES),
             lock: Lock::default(),
             origin: Origin::default(),
             points_only,
@@ -487,7 +486,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
 
     /// Sets the number of saves in the budget to the number that was kept over the reset.
     pub const fn set_saves_left(&mut self, left: u8) {
-        self.saves = Saves::new(left);
+        self.saves = Budget::new(left);
     }
 
     /// Returns whether a save has begun and is not complete.
@@ -555,6 +554,16 @@ impl<const SLOTS: usize> Config<SLOTS> {
         let first = points::of_port(self.board.first_port.wrapping_add(index as u16));
         self.is_in_force(index)
             .then(|| Point::of(&self.edited, first.wrapping_add(channel as u16)))
+    }
+
+    /// Returns whether a point is to start as it was, at the next start with its present module. `index` counts the ports
+    /// with a slot.
+    #[must_use]
+    pub fn starts_as_it_was(&self, index: usize, channel: usize) -> bool {
+        let port = self.board.first_port.wrapping_add(index as u16);
+        let point = points::of_port(port).wrapping_add(channel as u16);
+        self.modules.get(index) == Some(&self.saved.module(port))
+            && self.saved.get(START.wrapping_add(point)) == AS_IT_WAS
     }
 
     /// Returns SERIAL_LOW.

@@ -53,10 +53,10 @@ impl<const SLOTS: usize> Device<SLOTS> {
             let wanted = second.is_awake(alone) && second.wants(levels >> other & 1 != 0);
             if act
                 && link.is_awake(alone)
-                && let Some(port) = self.points.ports_mut().get_mut(slot)
+                && let Some(port) = self.points.ports().get(slot)
                 && let Some(act) = link.at_edge(level, port.channels.bit(output), wanted)
             {
-                port.act(output, act, now);
+                self.points.act(slot, output, act, now);
             }
         }
         if let Some(own) = self.levels.get_mut(slot) {

@@ -20,6 +20,7 @@ mod description;
 mod edge_log;
 mod events;
 mod identification;
+mod keeping;
 mod linking;
 mod points;
 mod port;
@@ -206,7 +207,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
             self.restart.get_or_insert(Restart::Update);
         }
         if tripped {
-            self.points.ports_mut().iter_mut().for_each(IoPort::go_safe);
+            self.points.go_safe();
         }
         tripped
     }

@@ -7,7 +7,9 @@ use modio_drivers::{CHANNELS, ChannelStatus, Kind};
 use register_map::{counters, edges, limits, points};
 
 use super::port::IoPort;
+use crate::KEEPS_OUTPUTS;
 use crate::config::{Config, kinds};
+use crate::links::Act;
 
 /// The points of the board's slots. Their port numbers are consecutive.
 #[derive(Debug)]
@@ -15,6 +17,8 @@ pub struct Points<const SLOTS: usize> {
     /// Address of the first point of the first port.
     first: u16,
     ports: [IoPort; SLOTS],
+    /// Outputs that are at SAFE and were not commanded since, the first port's channel 1 in bit 0.
+    at_safe: [u32; KEEPS_OUTPUTS as usize],
 }
 
 impl<const SLOTS: usize> Points<SLOTS> {
@@ -28,6 +32,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
                 let port = ports.next().unwrap_or_default();
                 IoPort::new(kinds(config.board(), port, module))
             }),
+            at_safe: [0; KEEPS_OUTPUTS as usize],
         }
     }
 
@@ -194,6 +199,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
 
     /// Writes bit points that the check has accepted.
     pub fn write_bits(&mut self, span: Span, bits: Bits<'_>) {
+        self.leave_safe(span);
         for (index, bit) in self.indices(span).zip(bits.iter()) {
             if let Some((port, channel)) = self.place_mut(index) {
                 port.set_output(channel, bit);
@@ -203,10 +209,70 @@ impl<const SLOTS: usize> Points<SLOTS> {
 
     /// Writes word points that the check has accepted.
     pub fn write_words(&mut self, span: Span, words: Words<'_>) {
+        self.leave_safe(span);
         for (index, word) in self.indices(span).zip(words.iter()) {
             if let Some((port, channel)) = self.place_mut(index) {
                 port.channels.set_word(channel, word);
             }
+        }
+    }
+
+    /// Does what a link does to an output of a port, at the uptime `now` in ms.
+    pub(super) fn act(&mut self, slot: usize, channel: usize, act: Act, now: u32) {
+        let port = self.ports.get_mut(slot);
+        if port.is_some_and(|port| port.act(channel, act, now)) {
+            self.leave_safe_now(slot * CHANNELS + channel, 1);
+        }
+    }
+
+    /// Sets the outputs to SAFE.
+    pub(super) fn go_safe(&mut self) {
+        for index in 0..SLOTS * CHANNELS {
+            let before = self.commanded(index);
+            if let Some((port, channel)) = self.place_mut(index)
+                && port.go_safe(channel, before)
+                && let [at_safe] = &mut self.at_safe[..]
+            {
+                *at_safe |= 1 << (index & 31);
+            }
+        }
+    }
+
+    /// Returns what a master or a link commanded last of the output with this index, not SAFE: 0 or 1 for a bit, 0 to 4095
+    /// raw for a word. A pulse counts as ended.
+    pub(super) fn commanded(&self, index: usize) -> u16 {
+        let is_safe = self.at_safe() >> (index & 31) & 1 != 0;
+        self.place(index).map_or(0, |(port, channel)| {
+            if is_safe {
+                port.before_safe(channel)
+            } else {
+                port.commanded(channel)
+            }
+        })
+    }
+
+    /// Returns the outputs that are at SAFE and were not commanded since.
+    #[inline(always)]
+    fn at_safe(&self) -> u32 {
+        self.at_safe.first().copied().unwrap_or_default()
+    }
+
+    /// Marks points as commanded, so that they are no longer at SAFE.
+    #[inline(always)]
+    fn leave_safe(&mut self, span: Span) {
+        // Most requests end here, after a few instructions.
+        if self.at_safe() != 0 {
+            self.leave_safe_now(self.index(span.start()), span.count());
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn leave_safe_now(&mut self, index: usize, count: u16) {
+        for at_safe in &mut self.at_safe {
+            // `count` is at least 1, and the points are within the 32.
+            let points = u32::MAX >> ((32 - u32::from(count)) & 31) << (index & 31);
+            *at_safe &= !points;
         }
     }
 

@@ -4,9 +4,12 @@ use modio_drivers::{CHANNELS, ChannelSettings, ChannelStatus, Channels, Code, Ki
 use register_map::codes::ModuleState;
 use register_map::limits;
 
-use crate::HAS_EVENTS;
 use crate::config::Point;
 use crate::links::Act;
+use crate::{HAS_EVENTS, KEEPS_OUTPUTS};
+
+/// Number of channels whose values before SAFE are kept.
+const KEPT: usize = if KEEPS_OUTPUTS { CHANNELS } else { 0 };
 
 /// The points of one port.
 #[derive(Debug)]
@@ -24,6 +27,8 @@ pub struct IoPort {
     pulse_ends: [u32; CHANNELS],
     /// Changes of words that are events; 0 for 1/256 of the range.
     deadbands: [u16; if HAS_EVENTS { CHANNELS } else { 0 }],
+    /// What was commanded last, raw, of each output that was set to SAFE since then.
+    before_safe: [u16; KEPT],
     /// The inputs have been scanned once. From then on a rising edge counts.
     scanned: bool,
     /// Channels that cannot be read or driven, channel 1 in bit 0.
@@ -43,6 +48,7 @@ impl IoPort {
             edges: [0; CHANNELS],
             pulse_ends: [0; CHANNELS],
             deadbands: Default::default(),
+            before_safe: [0; KEPT],
             scanned: false,
             failing: 0,
         }
@@ -134,10 +140,10 @@ impl IoPort {
     }
 
     /// Does what a link does to an output at the uptime `now` in ms. Nothing happens when a write of the output would be
-    /// rejected.
-    pub(super) fn act(&mut self, channel: usize, act: Act, now: u32) {
+    /// rejected: then returns false.
+    pub(super) fn act(&mut self, channel: usize, act: Act, now: u32) -> bool {
         if self.kind(channel) != Kind::BitOutput || self.failing >> (channel & 7) & 1 != 0 {
-            return;
+            return false;
         }
         self.set_output(channel, act.value);
         if act.pulse_ms > 0
@@ -146,6 +152,7 @@ impl IoPort {
             // 0 stands for no pulse.
             *end = now.wrapping_add(act.pulse_ms).max(1);
         }
+        true
     }
 
     /// Stores which channels cannot be read or driven, channel 1 in bit 0.
@@ -172,6 +179,25 @@ impl IoPort {
         }
     }
 
+    /// Returns what an output is commanded: 0 or 1 for a bit, 0 to 4095 raw for a word. A pulse counts as ended.
+    pub(super) fn commanded(&self, channel: usize) -> u16 {
+        match (self.kind(channel), self.setting(channel)) {
+            (Kind::BitOutput, _) if self.pulse_ends.get(channel) == Some(&0) => {
+                self.channels.bit(channel).into()
+            }
+            (Kind::WordOutput, Some(settings)) => {
+                let word = self.channels.word(channel);
+                scale::output_to_raw(word, settings.signal, settings.scale).get()
+            }
+            _ => 0,
+        }
+    }
+
+    /// Returns what was commanded, raw, before the output was set to SAFE.
+    pub(super) fn before_safe(&self, channel: usize) -> u16 {
+        self.before_safe.get(channel).copied().unwrap_or_default()
+    }
+
     /// Returns the value of a channel: 0 or 1 for a bit.
     pub(super) fn value(&self, channel: usize) -> u16 {
         match self.kind(channel) {
@@ -194,13 +220,16 @@ impl IoPort {
         range.unwrap_or_default() / 256
     }
 
-    /// Sets the outputs to SAFE.
-    pub fn go_safe(&mut self) {
-        for (channel, safe) in self.safe.into_iter().enumerate() {
-            if let Some(value) = safe {
-                self.command_raw(channel, value);
-            }
+    /// Sets an output to SAFE, and keeps what was commanded `before`. Returns false when SAFE holds the output.
+    pub(super) fn go_safe(&mut self, channel: usize, before: u16) -> bool {
+        let Some(value) = self.safe.get(channel).copied().flatten() else {
+            return false;
+        };
+        if let Some(place) = self.before_safe.get_mut(channel) {
+            *place = before;
         }
+        self.command_raw(channel, value);
+        true
     }
 
     /// Returns the state of the module.

@@ -17,6 +17,10 @@
 //!   +------+----------------------+   +------+---+-----------------------+
 //! ```
 //!
+//! The outputs that start as they were are pairs in the record of the settings, after these. When only they change, a
+//! record of outputs alone follows the settings. A save and a move to the other page copy the newest of them. So settings
+//! and outputs always change pages together, and a record of outputs stores no unsaved setting.
+//!
 //! Why a power cut during any operation does no harm:
 //!
 //! - A record counts once its first seal is programmed, after its CRC is complete. Until then the previous record
@@ -32,18 +36,20 @@
 //! - When something was stored but no record is valid, the defaults are in force and the damage is reported at
 //!   every start until something is saved. One page is left unchanged as evidence.
 
+mod copied;
 mod operation;
 mod saving;
 mod survey;
 
 use register_map::Board;
-use register_map::record::{Encoder, FIRST_OFFSET, SCHEMA, pair_of};
+use register_map::record::{Encoder, FIRST_OFFSET, Record, SCHEMA};
 
 use crate::config::Settings;
 pub use board_support::pages::{Page, Pages, WriteError};
+use copied::{Copied, OF_OUTPUTS};
 pub use operation::Operation;
 use operation::{Readying, Writing};
-pub use saving::Saving;
+pub use saving::{Given, Saving};
 use survey::{Place, Survey, record_at};
 
 /// A start moves the newest record to the other page when fewer bytes than this follow it and older records precede
@@ -109,6 +115,14 @@ impl Store {
             invalid: self.first.written || self.second.written,
             rejected: 0,
         }
+    }
+
+    /// Returns the record with the stored outputs. Call [`Self::load`] before: a start uses the outputs of the settings
+    /// that it returns.
+    #[must_use]
+    pub fn outputs<'a>(&self, flash: &'a impl Pages) -> Option<Record<'a>> {
+        let (page, offset) = self.newest_outputs()?;
+        record_at(flash.page(page), offset)
     }
 
     /// Prepares the pages for saves. Call this at every start, before the line is served: it may take 120 ms for
@@ -182,18 +196,20 @@ impl Store {
         flash: &mut F,
     ) -> Result<(), WriteError<F::Error>> {
         let Newest { page, place } = newest;
-        let offset = place.offset;
         let to = page.other();
         self.make_ready(to, flash)?;
         let survey = self.survey(page);
-        if survey.clean && (survey.records < 2 || survey.room() >= LITTLE_ROOM) {
+        if survey.clean && (!survey.has_old_records() || survey.room() >= LITTLE_ROOM) {
             return Ok(());
         }
-        let Some(record) = record_at(flash.page(page), offset) else {
+        let Some(record) = record_at(flash.page(page), place.offset) else {
             return Ok(());
         };
-        // Copy the record unchanged: the next start may run a newer firmware, which knows all of its values.
-        let count = u16::try_from(record.count()).unwrap_or(u16::MAX);
+        let mut settings = Copied::settings(&record, page, place.offset);
+        let mut outputs = self.stored_outputs(flash);
+        let count = outputs.iter().fold(settings.count(), |count, outputs| {
+            count.saturating_add(outputs.count())
+        });
         let sequence = place.sequence.wrapping_add(1);
         let encoder = Encoder::new(record.schema, sequence, count);
         // Version 0.1 wrote records without seals, so its longest record does not fit with seals.
@@ -201,12 +217,9 @@ impl Store {
             return Ok(());
         }
         let mut writing = Writing::new(to, FIRST_OFFSET, encoder);
-        let mut index: usize = 0;
         while let Some(operation) = writing.next(&mut || {
-            let bytes = flash.page(page).get(offset..)?;
-            let pair = pair_of(bytes, index);
-            index = index.saturating_add(1);
-            pair
+            let mut outputs = outputs.iter_mut();
+            settings.next(flash).or_else(|| outputs.next()?.next(flash))
         }) {
             operation.perform(flash)?;
         }
@@ -271,6 +284,25 @@ impl Store {
             (None, second) => second,
             (first, _) => first,
         }
+    }
+
+    /// Returns the stored outputs, to be copied.
+    fn stored_outputs(&self, flash: &impl Pages) -> [Copied; OF_OUTPUTS] {
+        [(); OF_OUTPUTS].map(|()| {
+            if let Some((page, offset)) = self.newest_outputs()
+                && let Some(record) = record_at(flash.page(page), offset)
+            {
+                Copied::outputs(&record, page, offset)
+            } else {
+                Copied::NOTHING
+            }
+        })
+    }
+
+    /// Returns page and offset of the record with the stored outputs.
+    fn newest_outputs(&self) -> Option<(Page, usize)> {
+        let Newest { page, place } = self.newest()?;
+        Some((page, self.survey(page).outputs.unwrap_or(place.offset)))
     }
 
     const fn survey(&self, page: Page) -> &Survey {

@@ -93,7 +93,8 @@ impl Readying {
 #[derive(Clone, Debug)]
 pub(super) struct Writing {
     pub(super) page: Page,
-    offset: usize,
+    /// Offset of the next half-word, in the end that after the record.
+    pub(super) offset: usize,
     encoder: Encoder,
 }
 

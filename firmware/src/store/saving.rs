@@ -1,26 +1,40 @@
-//! A save, one flash operation at a time.
+//! A save, or a record of outputs, one flash operation at a time.
 
-use register_map::record::{Encoder, FIRST_OFFSET, SCHEMA};
+use core::iter;
 
+use register_map::record::{Encoder, FIRST_OFFSET, OUTPUTS_SCHEMA, SCHEMA};
+
+use super::copied::{Copied, OF_OUTPUTS, is_setting};
 use super::operation::{Operation, Readying, Writing};
 use super::survey::record_at;
-use super::{Page, Pages, Store, WriteError};
+use super::{Newest, Page, Pages, Store, WriteError};
+use crate::KEEPS_OUTPUTS;
 use crate::config::Settings;
 
-/// A save under way. Pass the same settings to every step.
+/// The values to store.
+#[derive(Clone, Copy, Debug)]
+pub enum Given<'a, const SLOTS: usize> {
+    /// All settings.
+    Settings(&'a Settings<SLOTS>),
+    /// The outputs that are to start as they were, as pairs of a record.
+    Outputs(&'a [(u16, u16)]),
+}
+
+/// A save or a record of outputs under way. Pass the same values to every step.
 #[derive(Clone, Debug)]
 pub struct Saving {
     readying: Readying,
     writing: Writing,
-    sequence: u32,
-    /// Address after the setting that was stored last.
+    /// Address after the setting that was stored last, or index of the next output.
     cursor: u16,
+    /// The outputs that follow the settings of a save, or the settings in front of outputs.
+    copied: [Copied; OF_OUTPUTS],
 }
 
 impl Saving {
     /// Begins a save of these settings. Returns `None` when they are already stored.
     #[must_use]
-    pub fn new<const SLOTS: usize>(
+    pub fn of_settings<const SLOTS: usize>(
         store: &Store,
         flash: &impl Pages,
         settings: &Settings<SLOTS>,
@@ -28,7 +42,10 @@ impl Saving {
         let newest = store.newest();
         let stored =
             newest.and_then(|newest| record_at(flash.page(newest.page), newest.place.offset));
-        if stored.is_some_and(|stored| stored.pairs().eq(settings.changed_from(0))) {
+        if stored.is_some_and(|stored| {
+            let pairs = stored.pairs().filter(is_setting);
+            pairs.eq(settings.changed_from(0))
+        }) {
             return None;
         }
         let sequence = newest.map_or(1, |newest| newest.place.sequence.wrapping_add(1));
@@ -36,26 +53,90 @@ impl Saving {
         let count = settings
             .changed_from(0)
             .fold(0, |count: u16, _| count.saturating_add(1));
+        let copied = store.stored_outputs(flash);
+        let count = copied.iter().fold(count, |count, outputs| {
+            count.saturating_add(outputs.count())
+        });
         let encoder = Encoder::new(SCHEMA, sequence, count);
-        let (page, offset, readying) = place(store, encoder.size());
-        Some(Self {
+        Some(Self::new(place(store, encoder.size()), encoder, copied))
+    }
+
+    /// Begins a record of outputs: after the newest record if it fits there, or else on the other page together with the
+    /// stored settings. Returns `None` when these outputs are already stored, and when no settings are or leave no room.
+    #[must_use]
+    pub fn of_outputs(store: &Store, flash: &impl Pages, outputs: &[(u16, u16)]) -> Option<Self> {
+        let Newest {
+            page,
+            place: newest,
+        } = store.newest()?;
+        let mut copied = store.stored_outputs(flash);
+        let [stored] = &mut copied[..] else {
+            return None;
+        };
+        if iter::from_fn(|| stored.next(flash)).eq(outputs.iter().copied()) {
+            return None;
+        }
+        *stored = Copied::NOTHING;
+        let count = outputs.len() as u16;
+        let mut encoder = Encoder::new(OUTPUTS_SCHEMA, newest.sequence, count);
+        let survey = store.survey(page);
+        let mut place = (page, survey.end, Readying::Done);
+        if survey.room() < encoder.size() {
+            let record = record_at(flash.page(page), newest.offset)?;
+            *stored = Copied::settings(&record, page, newest.offset);
+            let sequence = newest.sequence.wrapping_add(1);
+            let count = count.saturating_add(stored.count());
+            encoder = Encoder::new(record.schema, sequence, count);
+            // Those of a later firmware may fill the page.
+            if encoder.size() > flash.page(page).len().saturating_sub(FIRST_OFFSET) {
+                return None;
+            }
+            place = self::place(store, encoder.size());
+        }
+        Some(Self::new(place, encoder, copied))
+    }
+
+    const fn new(
+        (page, offset, readying): (Page, usize, Readying),
+        encoder: Encoder,
+        copied: [Copied; OF_OUTPUTS],
+    ) -> Self {
+        Self {
             readying,
             writing: Writing::new(page, offset, encoder),
-            sequence,
             cursor: 0,
-        })
+            copied,
+        }
     }
 
     /// Returns the next operation, to be performed before the next call, or `None` when all are done.
-    pub fn next<const SLOTS: usize>(&mut self, settings: &Settings<SLOTS>) -> Option<Operation> {
+    pub fn next<const SLOTS: usize>(
+        &mut self,
+        flash: &impl Pages,
+        given: Given<'_, SLOTS>,
+    ) -> Option<Operation> {
         if let Some(operation) = self.readying.next() {
             return Some(operation);
         }
-        let cursor = &mut self.cursor;
+        let (cursor, copied) = (&mut self.cursor, &mut self.copied);
         self.writing.next(&mut || {
-            let pair = settings.changed_from(*cursor).next()?;
-            *cursor = pair.0.saturating_add(1);
-            Some(pair)
+            let mut copied = copied.iter_mut();
+            let mut copy = || copied.next()?.next(flash);
+            match given {
+                Given::Outputs(outputs) if KEEPS_OUTPUTS => copy().or_else(|| {
+                    let pair = outputs.get(usize::from(*cursor)).copied();
+                    *cursor = cursor.saturating_add(1);
+                    pair
+                }),
+                Given::Outputs(_) => None,
+                Given::Settings(settings) => match settings.changed_from(*cursor).next() {
+                    Some(pair) => {
+                        *cursor = pair.0.saturating_add(1);
+                        Some(pair)
+                    }
+                    None => copy(),
+                },
+            }
         })
     }
 
@@ -63,19 +144,19 @@ impl Saving {
     ///
     /// # Errors
     ///
-    /// When the settings are not stored.
+    /// When the record is not stored.
     pub fn finish<F: Pages>(
         &self,
         store: &mut Store,
         flash: &F,
     ) -> Result<(), WriteError<F::Error>> {
         store.survey_again(flash);
-        match store.newest() {
-            Some(newest) if newest.place.sequence == self.sequence => Ok(()),
-            _ => {
-                store.avoid(self.writing.page);
-                Err(WriteError::Worn)
-            }
+        let Writing { page, offset, .. } = self.writing;
+        if store.survey(page).end == offset {
+            Ok(())
+        } else {
+            store.avoid(page);
+            Err(WriteError::Worn)
         }
     }
 }

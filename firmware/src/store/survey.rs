@@ -46,8 +46,10 @@ impl Place {
 /// A summary of a page's bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Survey {
-    /// The valid record that counts.
+    /// The valid record of settings that counts.
     pub(super) newest: Option<Place>,
+    /// Offset of the valid record of outputs alone that replaces its outputs.
+    pub(super) outputs: Option<usize>,
     /// The page was erased completely, and the area after its sealed records is still erased.
     pub(super) clean: bool,
     /// The page has the mark of a complete erase.
@@ -70,6 +72,7 @@ impl Survey {
         let marked = page.first_chunk() == Some(&PAGE_MARK.to_le_bytes());
         let mut survey = Self {
             newest: None,
+            outputs: None,
             clean: marked,
             marked,
             blank: used == 0,
@@ -83,11 +86,17 @@ impl Survey {
             survey.clean &= offset == survey.end && place.sealed == 2;
             survey.end = place.seals.saturating_add(SEALS);
             survey.records = survey.records.saturating_add(1);
-            if survey
+            if record.holds_outputs() {
+                // Without a seal, its CRC may read differently at the next start.
+                if place.sealed > 0 {
+                    survey.outputs = Some(offset);
+                }
+            } else if survey
                 .newest
                 .is_none_or(|newest| place.counts_before(&newest))
             {
                 survey.newest = Some(place);
+                survey.outputs = None;
             }
         }
         survey.clean &= used <= survey.end;
@@ -97,6 +106,11 @@ impl Survey {
     /// Returns whether the page was erased completely and nothing was written since.
     pub(super) const fn is_ready(&self) -> bool {
         self.clean && self.records == 0
+    }
+
+    /// Returns whether the page has valid records that do not count.
+    pub(super) const fn has_old_records(&self) -> bool {
+        self.records > 1 + self.outputs.is_some() as usize
     }
 
     /// Returns the free bytes of a clean page, or 0 for any other page.

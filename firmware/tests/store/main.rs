@@ -2,6 +2,7 @@
 
 mod cuts;
 mod flash;
+mod outputs;
 mod running;
 mod vectors;
 mod wear;

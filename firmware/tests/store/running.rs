@@ -1,8 +1,9 @@
 //! The steps of a device's life that concern the store.
 
-use firmware::store::{Saving, Store, WriteError};
+use firmware::store::{Given, Saving, Store, WriteError};
 use register_map::board::MODIO_02;
 use register_map::configuration::{COMMAND, KEY, RULES, module_of};
+use register_map::record::OUTPUTS;
 use register_map::{Module, rule_at};
 
 use crate::flash::{Fault, MockFlash, Noise};
@@ -13,6 +14,9 @@ pub type Loaded = firmware::store::Loaded<1>;
 
 /// MODULE of the board's port.
 const MODULE_SLOT: u16 = module_of(5);
+
+/// Values of outputs, as pairs of a record.
+pub type Outputs = Vec<(u16, u16)>;
 
 pub type Failure = WriteError<Fault>;
 
@@ -36,10 +40,10 @@ pub fn save(
     flash: &mut MockFlash,
     settings: &Settings,
 ) -> Result<bool, Failure> {
-    let Some(mut saving) = Saving::new(store, flash, settings) else {
+    let Some(mut saving) = Saving::of_settings(store, flash, settings) else {
         return Ok(false);
     };
-    while let Some(operation) = saving.next(settings) {
+    while let Some(operation) = saving.next(flash, Given::Settings(settings)) {
         if let Err(failure) = operation.perform(flash) {
             // The error of the operation is more specific.
             let _ = saving.finish(store, flash);
@@ -48,6 +52,39 @@ pub fn save(
     }
     saving.finish(store, flash)?;
     Ok(true)
+}
+
+/// Records outputs as the firmware's background task does. Returns `false` when there was nothing to do.
+pub fn record(
+    store: &mut Store,
+    flash: &mut MockFlash,
+    outputs: &[(u16, u16)],
+) -> Result<bool, Failure> {
+    let Some(mut saving) = Saving::of_outputs(store, flash, outputs) else {
+        return Ok(false);
+    };
+    let given: Given<'_, 1> = Given::Outputs(outputs);
+    while let Some(operation) = saving.next(flash, given) {
+        if let Err(failure) = operation.perform(flash) {
+            let _ = saving.finish(store, flash);
+            return Err(failure);
+        }
+    }
+    saving.finish(store, flash)?;
+    Ok(true)
+}
+
+/// Returns the stored outputs.
+pub fn stored(store: &Store, flash: &MockFlash) -> Outputs {
+    let record = store.outputs(flash);
+    let pairs = record.iter().flat_map(|record| record.pairs());
+    pairs.filter(|(address, _)| *address >= OUTPUTS).collect()
+}
+
+/// Returns values of some outputs that differ from round to round.
+pub fn outputs(round: u16) -> Outputs {
+    let all = [0, 1, 2, 3].map(|point| (OUTPUTS + 0x0510 + point, round));
+    all[..1 + usize::from(round % 4)].to_vec()
 }
 
 pub fn settings(pairs: &[(u16, u16)]) -> Settings {

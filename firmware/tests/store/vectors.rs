@@ -1,6 +1,6 @@
 //! Stored configurations as literal bytes: every later firmware must read what earlier ones have stored.
 
-use firmware::store::{Page, Saving, Store};
+use firmware::store::{Given, Page, Saving, Store};
 use register_map::Module;
 use register_map::board::MODIO_02;
 use register_map::configuration::modules;
@@ -171,8 +171,8 @@ fn what_is_stored_is_the_documented_record() {
     let mut flash = MockFlash::with(&SEALED[..32], &[]);
     let (_, mut store) = start_well(&mut flash);
     let settings = settings(&STORED);
-    let mut saving = Saving::new(&store, &flash, &settings).unwrap();
-    while let Some(operation) = saving.next(&settings) {
+    let mut saving = Saving::of_settings(&store, &flash, &settings).unwrap();
+    while let Some(operation) = saving.next(&flash, Given::Settings(&settings)) {
         operation.perform(&mut flash).unwrap();
     }
     saving.finish(&mut store, &flash).unwrap();

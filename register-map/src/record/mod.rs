@@ -25,6 +25,17 @@
 //!                       +----------+
 //! ```
 //!
+//! The values of outputs that are to start as they were are pairs, too, after those of the settings. So that a change of
+//! them needs few bytes, a record of layout 2 has them alone. It replaces the outputs of the record of settings in front
+//! of it; a firmware that does not know layout 2 finds the settings nevertheless. The pairs of outputs:
+//!
+//! ```text
+//!  address, from 0xE000            value
+//!  0xE000 + module << 8 + point    word output: raw, 0 to 4095
+//!  0xE080 + module << 8 + point    digital outputs of a port, by its first point:
+//!                                  bits 0-3 levels, bits 8-11 which outputs are to start as they were
+//! ```
+//!
 //! A record counts once its first seal is programmed. A power cut during the programming of the CRC may leave cells
 //! that read differently from read to read, so that the CRC matches at one start and not at the next. The seal is
 //! programmed after the CRC is complete, so every cell of a sealed record reads the same every time. A record
@@ -50,6 +61,18 @@ pub const MARK: u16 = u16::from_le_bytes(*b"mo");
 /// Schema of the records that this version writes: layout 1, the settings of register map 1.
 pub const SCHEMA: u16 = 0x0101;
 
+/// Schema of a record of outputs alone: layout 2.
+pub const OUTPUTS_SCHEMA: u16 = 0x0201;
+
+/// First address of the pairs of outputs, which no register has.
+pub const OUTPUTS: u16 = 0xE000;
+
+/// Bit of the address of a pair of digital outputs.
+pub const BITS: u16 = 0x80;
+
+/// Newest layout that is known: that of [`OUTPUTS_SCHEMA`], where the firmware keeps outputs.
+const LAYOUTS: u16 = if cfg!(feature = "small") { 1 } else { 2 };
+
 /// Bytes of a record without its pairs and seals.
 pub const OVERHEAD: usize = HEAD + 4;
 
@@ -64,9 +87,9 @@ static CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 /// A valid record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Record<'a> {
-    /// Layout (high byte; always that of [`SCHEMA`]) and register map (low byte) of the writer.
+    /// Layout (high byte; that of [`SCHEMA`] or [`OUTPUTS_SCHEMA`]) and register map (low byte) of the writer.
     pub schema: u16,
-    /// Greater than the number of every record written before, except when it wraps.
+    /// Greater than the number of every record of settings written before, except when it wraps.
     pub sequence: u32,
     pairs: &'a [[u8; 4]],
 }
@@ -79,7 +102,7 @@ impl<'a> Record<'a> {
         let (head, rest) = bytes.split_first_chunk::<HEAD>()?;
         let [m0, m1, s0, s1, q0, q1, q2, q3, n0, n1] = *head;
         let schema = u16::from_le_bytes([s0, s1]);
-        if u16::from_le_bytes([m0, m1]) != MARK || schema >> 8 != SCHEMA >> 8 {
+        if u16::from_le_bytes([m0, m1]) != MARK || !(1..=LAYOUTS).contains(&(schema >> 8)) {
             return None;
         }
         let count = usize::from(u16::from_le_bytes([n0, n1]));
@@ -93,6 +116,12 @@ impl<'a> Record<'a> {
             sequence: u32::from_le_bytes([q0, q1, q2, q3]),
             pairs: body.as_chunks().0,
         })
+    }
+
+    /// Returns whether this is a record of outputs alone.
+    #[must_use]
+    pub const fn holds_outputs(&self) -> bool {
+        LAYOUTS > 1 && self.schema >> 8 == OUTPUTS_SCHEMA >> 8
     }
 
     /// Returns the bytes of the record without its seals.
@@ -217,16 +246,25 @@ mod tests {
 
     #[test]
     fn another_layout_is_rejected_and_another_register_map_accepted() {
-        let mut encoder = Encoder::new(SCHEMA + 1, 0, 0);
-        let bytes: Vec<u8> = std::iter::from_fn(|| encoder.next(&mut || None))
-            .flat_map(u16::to_le_bytes)
-            .collect();
-        assert_eq!(Record::decode(&bytes).unwrap().schema, SCHEMA + 1);
-        let mut encoder = Encoder::new(SCHEMA + 0x100, 0, 0);
-        let bytes: Vec<u8> = std::iter::from_fn(|| encoder.next(&mut || None))
-            .flat_map(u16::to_le_bytes)
-            .collect();
-        assert_eq!(Record::decode(&bytes), None);
+        let holds_outputs = |schema| {
+            let mut encoder = Encoder::new(schema, 0, 0);
+            let bytes: Vec<u8> = std::iter::from_fn(|| encoder.next(&mut || None))
+                .flat_map(u16::to_le_bytes)
+                .collect();
+            let record = Record::decode(&bytes)?;
+            assert_eq!(record.schema, schema);
+            Some(record.holds_outputs())
+        };
+        for (schema, expected) in [
+            (SCHEMA, Some(false)),
+            (SCHEMA + 1, Some(false)),
+            (OUTPUTS_SCHEMA, Some(true)),
+            (OUTPUTS_SCHEMA + 1, Some(true)),
+            (0x0001, None),
+            (0x0301, None),
+        ] {
+            assert_eq!(holds_outputs(schema), expected, "{schema:#06x}");
+        }
     }
 
     #[test]

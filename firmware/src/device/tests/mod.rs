@@ -5,6 +5,7 @@ extern crate std;
 mod deadband;
 mod edges;
 mod files;
+mod keeping;
 mod links;
 mod over_the_air;
 mod points;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use register_map::configuration::{self, HOLD};
+use register_map::configuration::{self, AS_IT_WAS};
 use register_map::points::Kind;
 use register_map::state;
 
@@ -244,7 +244,7 @@ fn reads_around_the_end(bench: &mut Bench<'_>, timeout: Duration) -> Check {
 fn start_value(bench: &mut Bench<'_>) -> Check {
     let (function, address, high) = output(bench)?;
     let start = bench.read_word(configuration::START + address)?;
-    if start == HOLD || bench.read_word(configuration::SCALE + address)? != 0 {
+    if start == AS_IT_WAS || bench.read_word(configuration::SCALE + address)? != 0 {
         return skip("START is not in the output's own units");
     }
     let before = read(bench, function, address)?;

@@ -36,7 +36,8 @@ impl Layout {
             .iter()
             .filter_map(|page| flash.get(page.clone()))
             .flat_map(record::records)
-            .map(|(_, record)| record);
+            .map(|(_, record)| record)
+            .filter(|record| !record.holds_outputs());
         let newest = records.reduce(|newest, record| {
             if record::is_newer(record.sequence, newest.sequence) {
                 record

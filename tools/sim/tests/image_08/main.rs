@@ -2,7 +2,7 @@
 //! test` sets after building it.
 //!
 //! The tests of the four slots are in `slots`, `analog`, `digital` and `faults_of_slots`, those of function 70 in `fast`,
-//! those of links in `links`. The other files are those of the modio-02's tests whose result depends on the board, with one
+//! those of links in `links`, of START = 0xFFFE in `as_it_was`. The other files are those of the modio-02's tests whose result depends on the board, with one
 //! module in the first slot: start, store, edges, timing, stack, the pins of the radio, and an update.
 
 use sim::board::{Layout, MODIO_08};
@@ -20,6 +20,7 @@ const FILES: [&str; 4] = [
 ];
 
 mod analog;
+mod as_it_was;
 mod digital;
 mod fast;
 mod faults_of_slots;

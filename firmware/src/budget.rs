@@ -1,46 +1,45 @@
-//! The budget of saves, which keeps a loop of saves from wearing out the flash.
+//! A budget of writes to the flash, which keeps a loop of them from wearing it out.
 
-use register_map::configuration::{SAVE_EVERY_S, SAVES};
-
-/// Number of saves that may be written now: [`SAVES`] after power-on, one more every [`SAVE_EVERY_S`] seconds up to
-/// that number.
+/// Number of writes that are possible now. It grows by one every `EVERY_S` seconds, up to `MOST`.
 #[derive(Debug)]
-pub(super) struct Saves {
+pub struct Budget<const MOST: u8, const EVERY_S: u32> {
     left: u8,
     /// Time since the last one was added, in milliseconds.
     passed_ms: u32,
 }
 
-impl Saves {
-    /// Returns a budget with this number of saves.
-    pub(super) const fn new(left: u8) -> Self {
+impl<const MOST: u8, const EVERY_S: u32> Budget<MOST, EVERY_S> {
+    /// Returns a budget of `left` writes, at most `MOST`.
+    #[must_use]
+    pub const fn new(left: u8) -> Self {
         Self {
-            left: if left < SAVES { left } else { SAVES },
+            left: if left < MOST { left } else { MOST },
             passed_ms: 0,
         }
     }
 
     /// Advances the time by `ms` milliseconds.
-    pub(super) const fn tick(&mut self, ms: u32) {
-        if self.left >= SAVES {
+    pub const fn tick(&mut self, ms: u32) {
+        if self.left >= MOST {
             self.passed_ms = 0;
             return;
         }
         self.passed_ms = self.passed_ms.saturating_add(ms);
-        // A tick is much shorter than this, so one save at most is due.
-        if self.passed_ms >= SAVE_EVERY_S * 1000 {
-            self.passed_ms -= SAVE_EVERY_S * 1000;
+        // A tick is shorter than this, so one write at most is due.
+        if self.passed_ms >= EVERY_S * 1000 {
+            self.passed_ms -= EVERY_S * 1000;
             self.left += 1;
         }
     }
 
-    /// Returns the number of saves that may be written now.
-    pub(super) const fn left(&self) -> u8 {
+    /// Returns the number of writes that are possible now.
+    #[must_use]
+    pub const fn left(&self) -> u8 {
         self.left
     }
 
-    /// Uses one save up. Returns false when there is none.
-    pub(super) const fn take(&mut self) -> bool {
+    /// Uses one write up. Returns false when there is none.
+    pub const fn take(&mut self) -> bool {
         if self.left == 0 {
             return false;
         }
@@ -51,7 +50,11 @@ impl Saves {
 
 #[cfg(test)]
 mod tests {
+    use register_map::configuration::{SAVE_EVERY_S, SAVES};
+
     use super::*;
+
+    type Saves = Budget<SAVES, SAVE_EVERY_S>;
 
     fn taken(saves: &mut Saves) -> u32 {
         (0..100).map(|_| u32::from(saves.take())).sum()

@@ -1,0 +1,169 @@
+//! Outputs that start as they were.
+
+use register_map::codes::LinkAction;
+use register_map::record::{encode_page, records};
+use register_map::{configuration::AS_IT_WAS, links};
+
+use super::*;
+use crate::outputs::Outputs;
+
+/// Digital outputs at points 0 to 3, relays at points 6 and 7, analog outputs at points 8 to 11, inputs at 12 to 15.
+const MODULES: [Module; 4] = [Module::Do4, Module::Relay2, Module::Ao4, Module::Di4];
+/// The outputs that start as they were.
+const POINTS: [u16; 6] = [0, 1, 3, 7, 8, 9];
+
+/// Returns a device whose stored settings let these outputs start as they were, together with these settings.
+fn keeping(settings: &[(u16, u16)]) -> Bench<4> {
+    let starts = POINTS.map(|point| (at::START + point, AS_IT_WAS));
+    let mut stored = settings.to_vec();
+    stored.extend(starts);
+    stored.sort_unstable();
+    Bench::on(&MODIO_08, MODULES, &stored)
+}
+
+impl Bench<4> {
+    fn set(&mut self, point: u8, on: bool) {
+        assert_eq!(self.ask(&[5, 0, point, if on { 0xFF } else { 0 }, 0])[0], 5);
+    }
+
+    /// Returns the values of the eight bit points and of the four analog outputs.
+    fn values(&mut self) -> (u8, Vec<u16>) {
+        (self.ask(&[1, 0, 0, 0, 8])[2], self.read(8, 4).unwrap())
+    }
+
+    /// Starts from these stored outputs.
+    fn restored(self, outputs: &[(u16, u16)]) -> Self {
+        let mut page = [0xFF; 200];
+        encode_page(0, outputs, &mut page).unwrap();
+        let (_, record) = records(&page).next().unwrap();
+        self.device.restore(&record);
+        self
+    }
+}
+
+fn pairs(outputs: &Outputs) -> &[(u16, u16)] {
+    outputs
+}
+
+#[test]
+fn outputs_start_with_the_stored_values_and_all_others_with_start() {
+    let stored = [(at::START + 2, 1), (at::START + 10, 1234)];
+    let mut bench = keeping(&stored);
+    let defaults = (0b0100, std::vec![0, 0, 1234, 0]);
+    assert_eq!(bench.values(), defaults);
+    bench.ask(&[0x0F, 0, 0, 0, 4, 1, 0b1001]);
+    bench.ask(&[0x0F, 0, 6, 0, 2, 1, 0b11]);
+    bench.write(8, &[100, 4095, 7, 8]).unwrap();
+    let outputs = bench.device.outputs();
+    let expected = [
+        // Module, port and which outputs count; the value of point 2, which does not, is not stored.
+        (0xE280, 0x0B09),
+        (0xE384, 0x0808),
+        (0xE508, 100),
+        (0xE509, 4095),
+    ];
+    assert_eq!(pairs(&outputs), expected);
+    let mut next = keeping(&stored).restored(&outputs);
+    assert_eq!(next.values(), (0b1000_1101, std::vec![100, 4095, 1234, 0]));
+    assert_eq!(next.device.outputs(), outputs);
+    // A record without outputs.
+    assert_eq!(keeping(&stored).restored(&[]).values(), defaults);
+}
+
+#[test]
+fn stored_values_of_another_module_or_out_of_range_are_ignored() {
+    let outputs = [
+        // A 4DO and a 4AO where a 2RELAY and a 4DO are now, a point without a module, and a value above 4095.
+        (0xE284, 0x0F0F),
+        (0xE500, 1),
+        (0xE5FF, 1),
+        (0xE508, 4096),
+        (0xE280, 0x0802),
+    ];
+    let mut bench = keeping(&[]).restored(&outputs);
+    assert_eq!(
+        bench.values(),
+        (0, std::vec![0; 4]),
+        "of point 1 no level is stored"
+    );
+}
+
+#[test]
+fn commanded_values_are_kept_while_outputs_are_at_safe() {
+    let mut bench = keeping(&[
+        (at::COMM_TIMEOUT, 5),
+        (at::SAFE + 1, 1),
+        (at::SAFE + 8, 50),
+        (at::SAFE + 9, at::HOLD),
+    ]);
+    bench.set(0, true);
+    bench.write(8, &[100, 200]).unwrap();
+    let before = bench.device.outputs();
+    for _ in 0..2 {
+        let now = bench.device.state.millis();
+        bench.device.request_seen(now, true);
+        assert!(bench.device.tick(500));
+    }
+    assert_eq!(bench.values(), (0b0010, std::vec![50, 200, 0, 0]));
+    assert_eq!(bench.device.outputs(), before);
+    // What is commanded from now on replaces it.
+    bench.set(1, true);
+    bench.write(8, &[50]).unwrap();
+    let after = bench.device.outputs();
+    assert_eq!(after[0], (0xE280, 0x0B03));
+    assert_eq!(after[2..], [(0xE508, 50), (0xE509, 200)]);
+}
+
+#[test]
+fn a_link_is_kept_and_a_pulse_is_not() {
+    let mut bench = keeping(&[(at::COMM_TIMEOUT, 5)]);
+    bench.unlock();
+    for (point, input, action) in [(0, 12, LinkAction::Toggle), (1, 13, LinkAction::Pulse)] {
+        let link = [input, action.code(), 10, 0];
+        bench.write(links::of_point(point, false), &link).unwrap();
+    }
+    bench.scan_port(3, |_| {});
+    bench.scan_port(3, |channels| {
+        channels.set_bit(0, true);
+        channels.set_bit(1, true);
+    });
+    assert_eq!(bench.values().0, 0b0011);
+    assert_eq!(bench.device.outputs()[0], (0xE280, 0x0B01));
+    // A link counts as well after SAFE.
+    bench.device.request_seen(0, false);
+    assert!(bench.device.tick(500));
+    assert_eq!(bench.values().0, 0);
+    assert_eq!(bench.device.outputs()[0], (0xE280, 0x0B01));
+    for _ in 0..2 {
+        bench.scan_port(3, |channels| channels.set_bit(0, false));
+        bench.scan_port(3, |channels| channels.set_bit(0, true));
+    }
+    assert_eq!(bench.device.outputs()[0], (0xE280, 0x0B00));
+}
+
+#[test]
+fn values_are_stored_raw_and_start_in_the_unit_of_the_settings() {
+    let mut bench = keeping(&[(at::SCALE + 8, 1)]);
+    bench.write(8, &[5000, 2048]).unwrap();
+    let outputs = bench.device.outputs();
+    assert_eq!(outputs[2..], [(0xE508, 2048), (0xE509, 2048)]);
+    let mut next = keeping(&[(at::SCALE + 8, 1), (at::RANGE + 8, 1)]).restored(&outputs);
+    assert_eq!(next.values().1[..2], [10_002, 2048]);
+    assert_eq!(next.device.outputs(), outputs);
+}
+
+#[test]
+fn saved_settings_alone_decide_which_outputs_are_stored() {
+    let mut bench = Bench::on(&MODIO_08, MODULES, &[]);
+    bench.unlock();
+    bench.write(at::START, &[AS_IT_WAS, 0, AS_IT_WAS]).unwrap();
+    assert!(bench.device.outputs().is_empty(), "not saved");
+    bench.write(at::COMMAND, &[1]).unwrap();
+    assert_eq!(pairs(&bench.device.outputs()), [(0xE280, 0x0500)]);
+    bench.device.config.end_save(true);
+    // The module in force is not the one of the next start.
+    bench.write(at::MODULE, &[3]).unwrap();
+    assert_eq!(bench.device.outputs().len(), 1);
+    bench.write(at::COMMAND, &[1]).unwrap();
+    assert!(bench.device.outputs().is_empty());
+}
