@@ -7,7 +7,7 @@
 /// The device serves function 70.
 pub const HAS_EVENTS: bool = !cfg!(feature = "small");
 
-/// The board has slots, a switch and a radio: nothing about it is fixed.
+/// The board has slots, a switch, and a radio as its second line: nothing about it is fixed.
 pub const HAS_SLOTS: bool = cfg!(feature = "slots");
 
 pub mod alive;
@@ -18,8 +18,8 @@ pub mod device;
 pub mod leds;
 pub mod line;
 pub mod links;
-pub mod radio;
 pub mod repairs;
+pub mod second;
 pub mod start_up;
 pub mod store;
 pub mod update;
