@@ -3,7 +3,8 @@
 //! A radio is a serial port over the air with its own timing. It outputs a frame in packets of up to 58 bytes with
 //! pauses between them. So a frame ends when its length and its CRC fit, instead of after t3.5, and pauses inside a
 //! frame do not count. LORA_FRAME_GAP ends a frame that never becomes complete, and a shorter silence one that cannot:
-//! traffic that a unit has joined in the middle becomes too long for a frame soon. On RS-232 t3.5 ends every frame.
+//! traffic that a unit has joined in the middle becomes too long for a frame soon. On RS-232 t3.5 ends every frame: a pause
+//! below it does not, and frames that are t3.5 apart are two.
 //!
 //! On both the bytes take a millisecond each, so a task that runs once a millisecond moves them.
 //!
@@ -113,7 +114,7 @@ impl<S: Read<u8> + Write<u8>> Peer for Rs232<S> {
 /// Times of a second line, in milliseconds.
 #[derive(Clone, Copy, Debug)]
 struct Times {
-    /// Silence that ends a frame that is not complete; on RS-232 every frame.
+    /// Silence that ends a frame that is not complete.
     frame_gap_ms: u16,
     /// Time after which the end of a reply has been sent, since the last byte was passed to the UART: of RS-232; or since
     /// the radio began to send the last packet.
@@ -132,6 +133,10 @@ impl Times {
 const LINE: LineSettings = LineSettings::SECOND;
 const BITS: u32 = LINE.format.bits();
 const GAPS: Gaps = Gaps::standard(LINE.baud, BITS as u8);
+
+/// Silence on RS-232 that ends a frame whose length and CRC fit, in milliseconds. When the next frame begins after t3.5,
+/// at least so many calls find no byte in between. The reply begins with the next call, which is after t3.5.
+const COMPLETE_GAP_MS: u16 = 3;
 
 /// Silence on RS-232 that counts as longer than t1.5, in milliseconds. That is 1.6 ms, but the next byte takes another
 /// 1.04 ms, and is found up to a millisecond late.
@@ -311,6 +316,8 @@ impl<P: Peer> SecondLine<P> {
             let gap = self.times.frame_gap_ms;
             let gap = if self.port.is_lost() {
                 LOST_GAP_MS.min(gap)
+            } else if !P::IS_RADIO && self.port.is_complete() {
+                COMPLETE_GAP_MS
             } else {
                 gap
             };

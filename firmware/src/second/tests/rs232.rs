@@ -8,13 +8,14 @@ use modbus_server::{Counters, Outcome};
 use super::bench::*;
 use crate::{line::units, second::Rs232};
 
-/// Milliseconds from the call that finds the last byte of a frame to its end: t3.5 of 9600 8N1 is 3.65.
-const GAP_MS: u16 = 4;
+/// Milliseconds from the call that finds the last byte of a complete frame to its end, one before that in which the reply
+/// begins. t3.5 of 9600 8N1 is 3.65.
+const GAP_MS: u16 = 3;
 
 /// Receives a request and returns the reply.
 fn reply_to(bench: &mut Bench<Rs232<Shared>>, request: &[u8]) -> Vec<u8> {
     bench.receive(request);
-    bench.pass(1 + GAP_MS + 1);
+    bench.pass(1 + 4 + 1);
     bench.sent()
 }
 
@@ -50,10 +51,28 @@ fn request_has_ended_with_its_last_byte() {
 fn two_requests_without_t35_between_them_are_one_damaged_frame() {
     let mut bench = Bench::rs232();
     bench.receive(&READ);
-    bench.pass(GAP_MS);
+    assert_eq!(bench.pass(GAP_MS), None);
     assert_eq!(reply_to(&mut bench, &READ), []);
     assert_eq!(bench.counters().communication_errors, 1);
     assert_eq!(reply_to(&mut bench, &READ), REPLY);
+}
+
+#[test]
+fn requests_with_t35_between_them_are_two() {
+    let mut bench = Bench::rs232();
+    bench.receive(&[0x00, 0x06, 0x00, 0x02, 0xAB, 0xCD, 0x97, 0x7E]);
+    assert_eq!(bench.pass(1 + GAP_MS), Some(Outcome::Accepted));
+    assert_eq!(reply_to(&mut bench, &READ), REPLY);
+    assert_eq!(bench.counters().communication_errors, 0);
+    assert_eq!(bench.registers[2], 0xABCD);
+}
+
+#[test]
+fn request_of_unknown_length_ends_after_a_longer_silence() {
+    let mut bench = Bench::rs232();
+    bench.receive(&echo());
+    assert_eq!(bench.pass(1 + GAP_MS), None);
+    assert_eq!(bench.pass(1), Some(Outcome::Accepted));
 }
 
 #[test]

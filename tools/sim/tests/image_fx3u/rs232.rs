@@ -177,7 +177,28 @@ fn reply_begins_after_t35() {
         assert_eq!(bytes, adu(&REPLY));
         let silence = reply[0].start - end;
         assert!(silence > Time::from_us(3_646), "{silence}");
-        assert!(silence < Time::from_us(7_500), "{silence}");
+        assert!(silence < Time::from_us(5_500), "{silence}");
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn frames_that_are_t35_apart_are_two_and_a_shorter_pause_ends_none() {
+    let mut bench = unit(&[]);
+    write(&mut bench, 1, KEY, OPENING_KEY);
+    let [a, b] = BETA.to_be_bytes();
+    for n in 0..20 {
+        // A broadcast, and a request that reads what it has written.
+        let start = bench.board.now() + Time::from_us(137 * u64::from(n));
+        let port = bench.board.rs232().unwrap();
+        let end = port.send(start, &adu(&[0, 6, a, b, 0x0B, 0xB8 + n]));
+        let request = adu(&[1, 3, a, b, 0, 1]);
+        let end = port.send(end + Time::from_us(3_750), &request[..5]);
+        port.send(end + Time::from_us(2_500), &request[5..]);
+        bench.board.run_for(Time::from_ms(100));
+        let reply = bench.board.rs232().unwrap().take_received();
+        let bytes: Vec<u8> = reply.iter().map(|byte| byte.byte).collect();
+        assert_eq!(bytes, adu(&[1, 3, 2, 0x0B, 0xB8 + n]));
     }
 }
 
