@@ -18,7 +18,10 @@ use firmware::{byte_queue::ByteQueue, config::RadioConfig, line, second};
 use modbus_server::Adu;
 use rtic::Mutex;
 
-use crate::{board::Device, clock};
+use crate::{
+    board::{BOARD, Device},
+    clock,
+};
 
 /// The second line.
 pub type Second = second::SecondLine<Peer>;
@@ -29,6 +32,16 @@ type Peer = modio_drivers::Lora<Serial, board_support::IoPin, board_support::IoP
 /// What is at its UART.
 #[cfg(not(feature = "slots"))]
 type Peer = second::Rs232<Serial>;
+
+/// Returns the second line, if it is in use. The image of a board without one has no code for what follows.
+#[inline(always)]
+pub const fn in_use(line: &mut Option<Second>) -> Option<&mut Second> {
+    if BOARD.second.is_some() {
+        line.as_mut()
+    } else {
+        None
+    }
+}
 
 static RECEIVED: ByteQueue = ByteQueue::new();
 static TO_SEND: ByteQueue = ByteQueue::new();
@@ -149,7 +162,7 @@ impl Polling {
         let passed = now.wrapping_sub(self.polled_at);
         self.polled_at = now;
         let polled = second.lock(|second| {
-            let second = second.as_mut()?;
+            let second = in_use(second)?;
             // At most the 40 ms for which an erase stops this task.
             let waits = second.poll(now, passed as u16);
             Some((waits, second.works()))

@@ -20,7 +20,11 @@ use modbus_server::{
 use register_map::codes::Command;
 use rtic::Mutex;
 
-use crate::{board::Device, line::Line, second::Second};
+use crate::{
+    board::Device,
+    line::Line,
+    second::{Second, in_use},
+};
 
 /// The unit address of a broadcast.
 const BROADCAST: u8 = 0;
@@ -98,7 +102,7 @@ impl Serving {
         // have the reply, because a command of the other line may follow it.
         if let Some(order) = self.second.order
             && second.lock(|line| {
-                line.as_ref().is_some_and(|line| {
+                in_use(line).is_some_and(|line| {
                     !(line.is_replying() || restarts(order) && line.is_ending())
                 })
             })
@@ -117,7 +121,7 @@ impl Serving {
             served = true;
         }
         if self.second.order.is_none()
-            && let Some(request) = second.lock(|line| line.as_mut()?.take())
+            && let Some(request) = second.lock(|line| in_use(line)?.take())
         {
             self.second.serve(request, None, rs485, second, device);
             served = true;
@@ -127,7 +131,7 @@ impl Serving {
             if let Some(line) = rs485.lock(|line| Some(line.as_ref()?.counters())) {
                 self.rs485.copy_counters(&line, device);
             }
-            if let Some(line) = second.lock(|line| Some(line.as_ref()?.counters())) {
+            if let Some(line) = second.lock(|line| Some(in_use(line)?.counters())) {
                 self.second.copy_counters(&line, device);
             }
         }
@@ -152,7 +156,7 @@ impl Serving {
             }
             rs485.lock(|line| line.as_mut().map(|line| line.set_units(units)));
             if let Some(units) = line::units(Some(unit), false) {
-                second.lock(|line| line.as_mut().map(|line| line.set_units(units)));
+                second.lock(|line| in_use(line).map(|line| line.set_units(units)));
             }
         }
     }
@@ -200,7 +204,7 @@ impl Served {
                 rs485.lock(|line| line.as_mut().map(|line| line.send(reply, delay_ms)));
             }
             (LineName::Second, _) => {
-                second.lock(|line| line.as_mut().map(|line| line.send_reply(reply)));
+                second.lock(|line| in_use(line).map(|line| line.send_reply(reply)));
             }
         }
         self.end(ended, outcome, writes, device);
