@@ -19,7 +19,7 @@ const LOADER_VARIABLES: u32 = 2048;
 /// Bytes of a vector.
 const VECTOR: u32 = 4;
 /// Handlers of the application whose interrupts depend on the board.
-const HANDLERS: [&str; 3] = ["LINE", "RADIO", "SERVE"];
+const HANDLERS: [&str; 3] = ["LINE", "SECOND", "SERVE"];
 
 fn main() {
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));

@@ -17,8 +17,8 @@ use crate::{
     gesture::Watch,
     kept,
     pin::Pin,
-    radio::RadioOff,
     rs485,
+    second::SecondOff,
     uart::LineSettings,
     unique_id, vectors, wait,
 };
@@ -72,9 +72,9 @@ pub struct Board {
     pub watchdog: Watchdog,
     /// The RS-485 line, off, with its driver disabled.
     pub line: LineOff,
-    /// The LoRa radio, off, with its pins floating.
-    pub radio: RadioOff,
-    /// The reset and clock control, for the set-up of the line and the radio.
+    /// The second line, off, with its pins floating.
+    pub second: SecondOff,
+    /// The reset and clock control, for the set-up of the lines.
     pub rcc: pac::RCC,
 }
 
@@ -199,10 +199,7 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
             start_bit: device.TIM1,
             clock,
         },
-        radio: RadioOff {
-            usart: device.USART3,
-            clock,
-        },
+        second: SecondOff { clock },
         rcc,
     }
 }

@@ -39,8 +39,8 @@ impl Fitted for If<false> {
     }
 }
 
-/// The radio.
-pub type Radio = If<{ BOARD.radio.is_some() }>;
+/// The second line.
+pub type Second = If<{ BOARD.second.is_some() }>;
 /// Slots for modules.
 pub type Slots = If<{ BOARD.has_slots() }>;
 /// Analog inputs or outputs.

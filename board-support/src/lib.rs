@@ -52,8 +52,6 @@ mod mem;
 mod own_dac;
 #[cfg(target_os = "none")]
 mod pin_io;
-#[cfg(target_os = "none")]
-mod radio;
 #[cfg(any(target_os = "none", test))]
 mod registers;
 #[cfg(target_os = "none")]
@@ -62,6 +60,8 @@ mod rs485;
 mod safe;
 #[cfg(target_os = "none")]
 mod scan_timer;
+#[cfg(target_os = "none")]
+mod second;
 #[cfg(target_os = "none")]
 mod slot;
 #[cfg(target_os = "none")]
@@ -86,11 +86,11 @@ pub use {
     i2c::DacBus,
     own_dac::OwnDac,
     pin_io::IoPin,
-    radio::{Damaged, Proof as RadioProof, RadioUart},
     registers::{Part, Registers, Wrong},
     rs485::{Rs485, disable_driver},
     safe::outputs_off,
     scan_timer::ScanTimer,
+    second::{Damaged, Proof as SecondProof, RadioIo, SecondOff, SecondUart},
     stm32f1xx_hal::pac,
     watchdog::Watchdog,
 };

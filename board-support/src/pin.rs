@@ -7,7 +7,7 @@
 //!
 //! | register | changed by |
 //! |---|---|
-//! | all, for slots, SW01, LEDs, the line and the radio | `board::setup`, `SlotPins`, `LineOff` and `RadioOff`: in `init`, before the first interrupt |
+//! | all, for slots, SW01, LEDs and the lines | `board::setup`, `SlotPins`, `LineOff` and `SecondOff`: in `init`, before the first interrupt |
 //! | port B CRL, for the DACs' bus | `BusPins`: in `init` and later by the background task alone |
 //! | those of the line's pins | `Rs485::set_up` later, too, at the highest priority in use |
 //! | all of them | `Registers`, which repairs them, at the highest priority in use |

@@ -74,6 +74,12 @@ impl LineSettings {
         baud: 9600,
         format: Format::N2,
     };
+
+    /// The second line, 9600 8N1. A LoRa module has no other rate in sleep mode.
+    pub const SECOND: Self = Self {
+        baud: 9600,
+        format: Format::N1,
+    };
 }
 
 /// Returns the baud rate register for a rate, given the UART's clock in Hz: clock divided by rate, in sixteenths of

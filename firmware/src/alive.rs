@@ -22,10 +22,10 @@ pub enum Task {
     Alarm,
     /// The device's clock.
     Beat,
-    /// The radio's UART.
-    RadioUart,
-    /// The radio's frames.
-    Radio,
+    /// The UART of the second line.
+    SecondUart,
+    /// The frames of the second line.
+    Second,
     /// The task that serves requests.
     Serve,
     /// The task that scans the modules.
@@ -98,8 +98,8 @@ mod tests {
         Task::Gap,
         Task::Alarm,
         Task::Beat,
-        Task::RadioUart,
-        Task::Radio,
+        Task::SecondUart,
+        Task::Second,
         Task::Serve,
         Task::Scan,
         Task::Background,

@@ -10,7 +10,7 @@ pub const HAS_EVENTS: bool = !cfg!(feature = "small");
 /// The device keeps the values of outputs that are to start as they were.
 pub const KEEPS_OUTPUTS: bool = !cfg!(feature = "small");
 
-/// The board has slots, a switch and a radio: nothing about it is fixed.
+/// The board has slots, a switch, and a radio as its second line: nothing about it is fixed.
 pub const HAS_SLOTS: bool = cfg!(feature = "slots");
 
 pub mod alive;
@@ -23,8 +23,8 @@ pub mod leds;
 pub mod line;
 pub mod links;
 pub mod outputs;
-pub mod radio;
 pub mod repairs;
+pub mod second;
 pub mod start_up;
 pub mod store;
 pub mod update;

@@ -8,7 +8,7 @@ use crate::fixed::FixedPort;
 use crate::kind::Kind;
 use crate::layout::{Layout, TwoPages};
 use crate::part::{KIB, Part, STM32F103C8, STM32F103CB, STM32F103RC, STM32F103VC};
-use crate::{BLOCKS, Module, Rule, Text, configuration, deadband, links, points};
+use crate::{BLOCKS, Module, Rule, Text, configuration, deadband, links, points, second};
 
 /// A board that the firmware is built for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,10 +27,19 @@ pub struct Board {
     pub fixed: &'static [FixedPort],
     /// A switch has the unit address. Without it register UNIT has.
     pub switch: bool,
-    /// The second line is a LoRa radio.
-    pub radio: bool,
+    /// The second line, if there is one.
+    pub second: Option<Second>,
     /// Flash pages that store the configuration, while the application runs without a loader.
     pub store: TwoPages,
+}
+
+/// What the second line of a board is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Second {
+    /// A LoRa radio, with the settings LORA to LORA_FRAME_GAP.
+    Radio,
+    /// An RS-232 socket with 9600 8N1.
+    Rs232,
 }
 
 /// What the image of a board is linked for, and what it may use.
@@ -44,8 +53,8 @@ pub struct Memory {
     pub stack: u32,
     /// Bytes of flash and of RAM that the application may use. The rest is for the stack, the store and a loader.
     pub budget: [u32; 2],
-    /// Names of the interrupts to which the application binds LINE, RADIO and SERVE: those of the line's UART and of the
-    /// radio's, and an unused one.
+    /// Names of the interrupts to which the application binds LINE, SECOND and SERVE: those of the UARTs of the RS-485 line
+    /// and of the second line, and an unused one.
     pub interrupts: [&'static str; 3],
 }
 
@@ -69,7 +78,7 @@ struct Row {
     slots: u16,
     fixed: &'static [FixedPort],
     switch: bool,
-    radio: bool,
+    second: Option<Second>,
     memory: Memory,
 }
 
@@ -92,7 +101,7 @@ const ROWS: [Row; 5] = [
         slots: 1,
         fixed: &[],
         switch: true,
-        radio: true,
+        second: Some(Second::Radio),
         memory: Memory {
             part: STM32F103CB,
             smaller: Some(STM32F103C8),
@@ -110,7 +119,7 @@ const ROWS: [Row; 5] = [
         slots: 4,
         fixed: &[],
         switch: true,
-        radio: true,
+        second: Some(Second::Radio),
         memory: Memory {
             part: STM32F103RC,
             smaller: None,
@@ -136,7 +145,7 @@ const ROWS: [Row; 5] = [
             FixedPort::new(Module::Ao4, 2),
         ],
         switch: false,
-        radio: false,
+        second: Some(Second::Rs232),
         memory: FX3U,
     },
     // The FX3U-24MR's clone: an STM32F103VC.
@@ -159,7 +168,7 @@ const ROWS: [Row; 5] = [
                 .or(Module::Ai2Ao2),
         ],
         switch: false,
-        radio: false,
+        second: Some(Second::Rs232),
         memory: FX3U,
     },
     // The "eth_modbus_io5r": an STM32F103CB.
@@ -176,7 +185,7 @@ const ROWS: [Row; 5] = [
             FixedPort::new(Module::Do4, 1),
         ],
         switch: false,
-        radio: false,
+        second: None,
         memory: Memory {
             part: STM32F103CB,
             smaller: None,
@@ -198,7 +207,7 @@ impl Row {
             slots: self.slots,
             fixed: self.fixed,
             switch: self.switch,
-            radio: self.radio,
+            second: self.second,
             store: TwoPages::before(part.flash, &part),
         }
     }
@@ -296,13 +305,20 @@ impl Board {
         self.memory().part.flash <= 128 * KIB
     }
 
+    /// Returns whether the second line is a radio.
+    #[must_use]
+    pub const fn has_radio(&self) -> bool {
+        matches!(self.second, Some(Second::Radio))
+    }
+
     /// Returns whether the board has a register, which every board has or every board of some kind. Links exist only for
     /// some of the points.
     #[must_use]
     pub const fn has(&self, address: u16) -> bool {
         match address {
             configuration::UNIT => !self.switch,
-            configuration::LORA..=configuration::LORA_FRAME_GAP => self.radio,
+            configuration::LORA..=configuration::LORA_FRAME_GAP => self.has_radio(),
+            second::BUS_MESSAGES..=second::T15_GAPS => self.second.is_some(),
             _ if deadband::contain(address) => !self.is_small(),
             _ => links::exist(self.slots as usize) || !links::contain(address),
         }

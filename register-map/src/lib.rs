@@ -43,9 +43,9 @@ pub mod name;
 pub mod part;
 pub mod points;
 mod port;
-pub mod radio;
 pub mod record;
 mod rule;
+pub mod second;
 pub mod state;
 pub mod update;
 mod value;
@@ -69,7 +69,7 @@ pub static BLOCKS: [&Block; 10] = [
     &configuration::BLOCK,
     &state::BLOCK,
     &fault::BLOCK,
-    &radio::BLOCK,
+    &second::BLOCK,
     &counters::BLOCK,
     &edges::BLOCK,
     &links::BLOCK,

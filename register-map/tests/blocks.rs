@@ -119,7 +119,7 @@ fn the_state_registers_are_readable_except_for_gaps() {
         );
     }
     assert!(runs(fault::RULES, 0x260, 16).is_some());
-    assert!(runs(radio::RULES, 0x270, 9).is_some() && runs(radio::RULES, 0x270, 10).is_none());
+    assert!(runs(second::RULES, 0x270, 9).is_some() && runs(second::RULES, 0x270, 10).is_none());
     assert!(runs(counters::RULES, 0x300, 64).is_some() && counters::of_point(16) == 0x320);
     assert!(runs(edges::RULES, 0x380, 64).is_some() && runs(edges::RULES, 0x380, 65).is_none());
 }
@@ -131,7 +131,7 @@ fn spans_are_the_addresses_of_the_rules_with_adjacent_ones_joined() {
         (configuration::RULES, configuration::SPANS),
         (state::RULES, state::SPANS),
         (fault::RULES, fault::SPANS),
-        (radio::RULES, radio::SPANS),
+        (second::RULES, second::SPANS),
         (counters::RULES, counters::SPANS),
         (edges::RULES, edges::SPANS),
         (links::RULES, links::SPANS),

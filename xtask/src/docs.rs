@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use register_map::points::Kind;
 use register_map::{
     BLOCKS, Block, Board, Field, InForce, Module, Rule, Scope, Text, Unit, Value, Values, codes,
-    configuration, counters, deadband, edges, fault, links, points,
+    configuration, counters, deadband, edges, fault, links, points, second,
 };
 
 const INTRODUCTION: &str = "\
@@ -57,6 +57,11 @@ const CONFIGURATION_NOTES: &str = "
   the point does not use the setting, every value of the register is allowed. A change of MODULE from one module to
   another sets the settings of its points to their defaults. A change from none to a module keeps the settings that suit.
 - Until the restart a \"now\" setting that does not suit the module in force counts as its default.
+";
+
+const SECOND_NOTES: &str = "
+The second line is a radio on a modio-02 and modio-08, and the RS-232 socket on an fx3u. An eth-io5r has none: exception 02.
+Over a radio the gaps are always 0. On RS-232 those shorter than 3 ms may be missed.
 ";
 
 const COUNTER_NOTES: &str = "
@@ -124,6 +129,8 @@ fn write_markdown(out: &mut impl Write) -> Result {
             write_store(out)?;
         } else if block.first == fault::BLOCK.first {
             out.write_str(FAULT_NOTES)?;
+        } else if block.first == second::BLOCK.first {
+            out.write_str(SECOND_NOTES)?;
         } else if block.first == counters::BLOCK.first {
             out.write_str(COUNTER_NOTES)?;
         } else if block.first == edges::BLOCK.first {

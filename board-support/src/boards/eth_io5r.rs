@@ -47,5 +47,5 @@ pub const BOARD: Descriptor = Descriptor {
     ],
     address: AddressPins::Register(Gesture::Held(BUTTON)),
     leds: &[Pin::a(8)],
-    radio: None,
+    second: None,
 };

@@ -3,7 +3,7 @@
 //! The pins are those on which three sources agree: eddyem/stm32samples, `F1:F103/FX3U/` (with a schematic of the -24MR),
 //! kinsamanka/openplc-stm32-freertos, `src/boards.h` (BOARD_FX3U), and Chupakabra303/FX_PLC_STM32duino.
 
-use super::{AddressPins, Descriptor, FullScale, LinePins, PortKind, SlotPins};
+use super::{AddressPins, Descriptor, FullScale, LinePins, PortKind, SecondPins, SlotPins};
 use crate::{
     gesture::Gesture,
     pin::{Pin, Port},
@@ -80,6 +80,9 @@ pub(super) const fn board(name: &'static str, slots: &'static [SlotPins]) -> Des
         slots,
         address: AddressPins::Register(Gesture::Moved(RUN)),
         leds: &LEDS,
-        radio: None,
+        second: Some(SecondPins {
+            uart: Usart::Usart1,
+            radio: None,
+        }),
     }
 }

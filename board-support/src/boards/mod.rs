@@ -2,7 +2,7 @@
 //! register-map, which the linker script has from there.
 //!
 //! A cargo feature with the board's name selects the board. [`board`](crate::board) holds what all boards share:
-//! the radio's UART on PB10 and PB11, and the DACs' bus on PB6 and PB7.
+//! the DACs' bus on PB6 and PB7.
 
 pub mod eth_io5r;
 mod fx3u;
@@ -37,8 +37,8 @@ pub struct Descriptor {
     /// The LEDs for activity, fault and running, or only that for running. High lights activity and fault, low lights
     /// running.
     pub leds: &'static [Pin],
-    /// The pins of the LoRa radio, besides its UART on PB10 and PB11.
-    pub radio: Option<RadioPins>,
+    /// The second line.
+    pub second: Option<SecondPins>,
 }
 
 /// What sets the unit address.
@@ -102,7 +102,16 @@ pub struct Analog {
 /// Codes of the converter at 10 V or 20 mA, for each channel.
 pub type FullScale = [u16; 4];
 
-/// The pins of the LoRa radio.
+/// The UART of the second line, and what is connected to it.
+#[derive(Clone, Copy, Debug)]
+pub struct SecondPins {
+    /// The UART, whose pins for TX and RX follow from it.
+    pub uart: Usart,
+    /// Further pins of a LoRa radio. `None` for an RS-232 socket.
+    pub radio: Option<RadioPins>,
+}
+
+/// The pins of the LoRa radio, besides its UART.
 #[derive(Clone, Copy, Debug)]
 pub struct RadioPins {
     /// M0 and M1, which select the mode.

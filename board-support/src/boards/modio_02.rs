@@ -1,6 +1,6 @@
 //! The modio-02: an STM32F103CB, or a C8 on a bare "Blue Pill" with a transceiver. One slot, port 5.
 
-use super::{AddressPins, Descriptor, LinePins, PortKind, RadioPins, SlotPins};
+use super::{AddressPins, Descriptor, LinePins, PortKind, RadioPins, SecondPins, SlotPins};
 use crate::{
     pin::{Pin, Port},
     usart::Usart,
@@ -31,8 +31,11 @@ pub const BOARD: Descriptor = Descriptor {
         Pin::b(15),
     ]),
     leds: &[Pin::b(8), Pin::b(9), Pin::c(13)],
-    radio: Some(RadioPins {
-        mode: [Pin::b(0), Pin::b(1)],
-        aux: Pin::b(5),
+    second: Some(SecondPins {
+        uart: Usart::Usart3,
+        radio: Some(RadioPins {
+            mode: [Pin::b(0), Pin::b(1)],
+            aux: Pin::b(5),
+        }),
     }),
 };

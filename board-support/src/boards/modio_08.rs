@@ -1,6 +1,6 @@
 //! The modio-08: an STM32F103RC. Four slots, ports 1 to 4.
 
-use super::{AddressPins, Descriptor, LinePins, PortKind, RadioPins, SlotPins};
+use super::{AddressPins, Descriptor, LinePins, PortKind, RadioPins, SecondPins, SlotPins};
 use crate::{
     pin::{Pin, Port},
     usart::Usart,
@@ -45,8 +45,11 @@ pub const BOARD: Descriptor = Descriptor {
         Pin::b(15),
     ]),
     leds: &[Pin::b(8), Pin::b(9), Pin::c(13)],
-    radio: Some(RadioPins {
-        mode: [Pin::c(10), Pin::c(11)],
-        aux: Pin::c(12),
+    second: Some(SecondPins {
+        uart: Usart::Usart3,
+        radio: Some(RadioPins {
+            mode: [Pin::c(10), Pin::c(11)],
+            aux: Pin::c(12),
+        }),
     }),
 };

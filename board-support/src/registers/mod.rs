@@ -9,7 +9,7 @@
 //! | RS-485 line: its UART with the pins, TIM2, TIM1, edges | one row per millisecond, while no reply is being sent | set up with its block by the caller |
 //! | clocks and resets | one row each time, and first when any other row is wrong | written |
 //! | pins, interrupts, flash | one row each time | written |
-//! | scan timer, radio | one row each time | set up with its block by the caller |
+//! | scan timer, second line | one row each time | set up with its block by the caller |
 //!
 //! A register is expected to keep what it returned after the start instead of what was written, because an emulator
 //! or a clone of the part may not keep every bit. Pins and bits that change in operation are not in the table: the
@@ -21,7 +21,7 @@ mod table;
 
 use table::{
     ALL, CLOCKS, DRIVER_MODES, FLASH_ACR, ICER, ISER, LINE, MAPR, MODES, NVIC, ODR, PERIPHERALS,
-    PLACES, RADIO, ROWS, SCAN_TIMER, UART_MODES,
+    PLACES, ROWS, SCAN_TIMER, SECOND, UART_MODES,
 };
 
 use crate::boards::BOARD;
@@ -41,8 +41,8 @@ pub enum Wrong {
     Mended,
     /// The caller must set the scan timer up.
     ScanTimer,
-    /// The caller must set the radio's UART up.
-    Radio,
+    /// The caller must set the second line's UART up.
+    Second,
     /// The caller must set the line up.
     Line,
 }
@@ -111,9 +111,9 @@ pub struct Registers {
 }
 
 impl Registers {
-    /// Records the present settings. The line and the radio are compared only when they are in use. Call this when
+    /// Records the present settings. Each line is compared only when it is in use. Call this when
     /// everything is set up and the scan timer runs.
-    pub fn record(bus: &impl Bus, line: bool, radio: bool) -> Self {
+    pub fn record(bus: &impl Bus, line: bool, second: bool) -> Self {
         const NOTHING: Row = Row {
             place: (FLASH_ACR >> 2) as u16,
             mask: 0,
@@ -122,7 +122,7 @@ impl Registers {
         let mut rows = [NOTHING; ROWS];
         for (n, (row, (place, mask))) in rows.iter_mut().zip(PLACES).enumerate() {
             // A block that is not in use may have no clock.
-            if n < RADIO || n >= LINE && line || n < LINE && radio {
+            if n < SECOND || n >= LINE && line || n < LINE && second {
                 (row.place, row.mask) = (place, mask);
                 if (CLOCKS..MODES).contains(&n) {
                     row.mask &= pulled(bus, row.address() - u32::from(ODR));
@@ -186,8 +186,8 @@ impl Registers {
             self.row = 0;
         } else if wrong >= LINE {
             return Wrong::Line;
-        } else if wrong >= RADIO {
-            return Wrong::Radio;
+        } else if wrong >= SECOND {
+            return Wrong::Second;
         } else if wrong >= SCAN_TIMER {
             return Wrong::ScanTimer;
         } else if let Some(row) = self.rows.get(wrong) {
@@ -232,7 +232,7 @@ mod tests {
     use std::{collections::BTreeMap, vec::Vec};
 
     use super::{
-        table::{RCC, TIM2, UART, USART3},
+        table::{RCC, SECOND_UART, TIM2, UART},
         *,
     };
     use crate::pin::Port;
@@ -294,7 +294,7 @@ mod tests {
         for (n, row) in recorded.rows.iter().enumerate() {
             let (wrong, ms) = match n {
                 LINE.. => (Wrong::Line, LINE_MS as u8),
-                RADIO.. => (Wrong::Radio, ROUND),
+                SECOND.. => (Wrong::Second, ROUND),
                 SCAN_TIMER.. => (Wrong::ScanTimer, ROUND),
                 _ => (Wrong::Mended, ROUND),
             };
@@ -343,7 +343,7 @@ mod tests {
             run(&mut registers, &mut memory, LINE_MS as u8),
             [Wrong::Line]
         );
-        memory.0.insert(USART3 + 0x0C, 0);
+        memory.0.insert(SECOND_UART + 0x0C, 0);
         assert_eq!(run(&mut unused, &mut memory, ROUND), []);
     }
 }

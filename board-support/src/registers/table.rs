@@ -1,7 +1,7 @@
 //! Which registers are compared: the table, which follows from the board's descriptor.
 
 use crate::{
-    boards::{BOARD, RadioPins},
+    boards::{BOARD, RadioPins, SecondPins},
     pin::{Pin, Port},
 };
 
@@ -9,7 +9,6 @@ pub(super) const PERIPHERALS: u32 = 0x4000_0000;
 // Base addresses (RM0008 table 3, PM0056 4.3).
 pub(super) const TIM2: u32 = 0x4000_0000;
 const TIM4: u32 = 0x4000_0800;
-pub(super) const USART3: u32 = 0x4000_4800;
 const AFIO: u32 = 0x4001_0000;
 pub(super) const MAPR: u32 = AFIO + 0x04;
 const EXTI: u32 = 0x4001_0400;
@@ -33,16 +32,33 @@ pub(super) const ALL: i16 = -1;
 const NONE: &[u16] = &[];
 
 pub(super) const UART: u32 = BOARD.line.uart.base();
+/// The UART of the second line, if there is one.
+pub(super) const SECOND_UART: u32 = match BOARD.second {
+    Some(SecondPins { uart, .. }) => uart.base(),
+    None => UART,
+};
 /// The configuration register of TX and RX, and that of the driver enable.
 pub(super) const UART_MODES: u32 = BOARD.line.uart.tx().mode_register();
 pub(super) const DRIVER_MODES: u32 = BOARD.line.driver.mode_register();
 /// The pin whose edges raise an interrupt, if no timer captures them.
 const EDGE: Option<Pin> = BOARD.line.edge();
 
+/// Returns the registers of the second line's UART at these offsets, if there is one.
+const fn second(offsets: &'static [u16]) -> &'static [u16] {
+    if BOARD.second.is_some() {
+        offsets
+    } else {
+        NONE
+    }
+}
+
 /// Returns the pulls of a port. The radio changes that of AUX.
 const fn pulls(port: Port) -> Block {
-    let changes = match BOARD.radio {
-        Some(RadioPins { aux, .. }) if aux.port() as u8 == port as u8 => 1 << aux.number(),
+    let changes = match BOARD.second {
+        Some(SecondPins {
+            radio: Some(RadioPins { aux, .. }),
+            ..
+        }) if aux.port() as u8 == port as u8 => 1 << aux.number(),
         _ => 0,
     };
     if is_used(port) {
@@ -107,7 +123,7 @@ const fn priority(interrupt: u16) -> Block {
     (NVIC + register as u32, ALL, &[0])
 }
 
-/// The registers in groups: clocks and resets, pulls, others that are written, scan timer, radio, line.
+/// The registers in groups: clocks and resets, pulls, others that are written, scan timer, second line, line.
 const GROUPS: [&[Block]; 6] = [
     // CFGR, APB2RSTR, APB1RSTR, AHBENR, APB2ENR, APB1ENR (RM0008 7.3).
     &[(RCC, ALL, &[0x04, 0x0C, 0x10, 0x14, 0x18, 0x1C])],
@@ -145,8 +161,8 @@ const GROUPS: [&[Block]; 6] = [
     &[(TIM4, ALL, &[0x00, 0x08, 0x0C, 0x28, 0x2C])],
     &[
         // CR1 without TXEIE, BRR, CR2, CR3 (RM0008 27.6).
-        (USART3, !(1 << 7), &[0x0C]),
-        (USART3, ALL, &[0x08, 0x10, 0x14]),
+        (SECOND_UART, !(1 << 7), second(&[0x0C])),
+        (SECOND_UART, ALL, second(&[0x08, 0x10, 0x14])),
     ],
     &[
         // BRR, CR1, CR2, CR3.
@@ -208,7 +224,7 @@ pub(super) const CLOCKS: usize = rows(1);
 // Positions of rows: after the pulls, and the first of each block.
 pub(super) const MODES: usize = rows(2);
 pub(super) const SCAN_TIMER: usize = rows(3);
-pub(super) const RADIO: usize = rows(4);
+pub(super) const SECOND: usize = rows(4);
 pub(super) const LINE: usize = rows(5);
 pub(super) const ROWS: usize = rows(GROUPS.len());
 

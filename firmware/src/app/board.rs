@@ -1,8 +1,8 @@
 //! The board of this image, as it appears in the register map and the self-description.
 
 use board_support::boards::{self, AddressPins, PortKind, SlotPins};
-use firmware::device::Fixed;
-use register_map::{Board, FixedPort, Module, layout::Layout};
+use firmware::{HAS_SLOTS, device::Fixed};
+use register_map::{Board, FixedPort, Module, board::Second, layout::Layout};
 
 /// The board's row in the register map, found by name.
 pub const BOARD: &Board = match Board::named(boards::BOARD.name) {
@@ -27,7 +27,13 @@ const _: () = {
     assert!(BOARD.slots as usize == boards::SLOTS);
     assert!(BOARD.switch == matches!(boards::BOARD.address, AddressPins::Switch(_)));
     assert!(BOARD.is_small() == cfg!(feature = "small"));
-    assert!(BOARD.radio == boards::BOARD.radio.is_some());
+    assert!(match (BOARD.second, boards::BOARD.second) {
+        (Some(Second::Radio), Some(pins)) => pins.radio.is_some(),
+        (Some(Second::Rs232), Some(pins)) => pins.radio.is_none(),
+        (None, None) => true,
+        _ => false,
+    });
+    assert!(BOARD.has_radio() == HAS_SLOTS);
     assert!(BOARD.fixed.is_empty() == boards::BOARD.has_slots());
     let mut port = 0;
     while port < BOARD.fixed.len() {

@@ -5,21 +5,21 @@
 //! | `beat` | TIM4, 1 kHz | 4 | advances the device's clock, runs the line's response delay, checks the registers, pends `scan`. If late, the clock is late |
 //! | `uart` | LINE: USART1 or the board's UART | 4 | reads or writes a byte, turns the driver off at the end. At 921600 bit/s a byte is received every 12 us; if the task is later than that, a byte is lost, the receiver reports an overrun and the frame is discarded |
 //! | `gap` | TIM2 | 4 | handles t1.5 and t3.5. If late, a silence becomes longer, never shorter |
-//! | `radio_uart` | RADIO: USART3 or the board's UART | 4 | moves a byte between the radio's UART and the queues. A byte is received every 1.04 ms; if the task is later than that, a byte is lost |
+//! | `second_uart` | SECOND: USART3 or the board's UART | 4 | moves a byte between the UART of the second line and the queues. A byte is received every 1.04 ms; if the task is later than that, a byte is lost |
 //! | `alarm` | TIM1_CC | 4 | takes the unit's turns in an arbitration. If late, a start bit is, which the windows allow for up to 8.5 us. Aborts a reply that does not end |
-//! | `serve` | SERVE: EXTI3 or the board's, pended by `gap`, `uart` and `radio` | 3 | serves a complete frame; executes a command when its response has been sent. If late, the response is late |
+//! | `serve` | SERVE: EXTI3 or the board's, pended by `gap`, `uart` and `second` | 3 | serves a complete frame; executes a command when its response has been sent. If late, the response is late |
 //! | `scan` | EXTI1, pended by `beat` and by a write | 2 | copies inputs into the device and outputs to the modules, runs the time-outs. If late, it catches up |
-//! | `radio` | EXTI4, pended by `scan` while the radio is on | 2 | sets the radio up, receives frames and sends replies through the queues. If late, a silence becomes longer, never shorter |
+//! | `second` | EXTI4, pended by `scan` while there is a second line: a radio that is on, or RS-232 | 2 | sets the radio up, receives frames and sends replies through the queues. If late, a silence becomes longer, never shorter |
 //! | `background` | EXTI0, pended every 10 ms and on commands | 1 | DAC transfers, configuration store, LEDs, log. Not urgent |
 //! | `idle` | - | - | refreshes the watchdog when each task above has set its mark; sleeps |
 //!
 //! The tasks of priority 4 run from RAM with all that they call (`memory.x`). They continue while flash is erased
 //! or programmed; the others wait for up to 40 ms.
 //!
-//! `serve`, `scan`, `radio` and `background` act as software tasks, but each is bound to an interrupt that nothing else
+//! `serve`, `scan`, `second` and `background` act as software tasks, but each is bound to an interrupt that nothing else
 //! uses. docs/decisions.md says why.
 //!
-//! LINE, RADIO and SERVE are names in the board's row in crate register-map.
+//! LINE, SECOND and SERVE are names in the board's row in crate register-map.
 
 #![no_std]
 #![no_main]
@@ -33,9 +33,9 @@ mod installed;
 mod line;
 mod log;
 mod persistence;
-mod radio;
 mod rtt;
 mod scanning;
+mod second;
 mod serving;
 mod start;
 mod trap;
@@ -46,7 +46,7 @@ mod upkeep;
 mod app {
     use core::mem::MaybeUninit;
 
-    use board_support::{RadioUart, ScanTimer, Watchdog, boards::SLOTS, device::interrupt, kept};
+    use board_support::{ScanTimer, SecondUart, Watchdog, boards::SLOTS, device::interrupt, kept};
     use firmware::alive::{self, Task};
     use heapless::spsc::{Consumer, Producer, Queue};
     use modbus_server::Adu;
@@ -58,8 +58,8 @@ mod app {
         clock,
         line::Line,
         log::Event,
-        radio::{Polling, Radio, on_interrupt},
         scanning::Scanning,
+        second::{Polling, Second, on_interrupt},
         serving::Serving,
         start,
         upkeep::Upkeep,
@@ -69,10 +69,9 @@ mod app {
     struct Shared {
         /// `None` while SW01 is set to no unit address: the line is not served.
         line: Option<Line>,
-        /// `None` while the radio is off.
-        radio: Option<Radio>,
-        /// `None` while the radio is off.
-        radio_uart: Option<RadioUart>,
+        /// `None` while the radio is off, and on a board without a second line.
+        second: Option<Second>,
+        second_uart: Option<SecondUart>,
         /// Built in place, because it is too large to be moved over the stack.
         device: &'static mut Device,
         /// What the scan and the background task exchange about each slot's DAC.
@@ -85,7 +84,7 @@ mod app {
         upkeep: Upkeep,
         serving: Serving,
         scanning: Scanning,
-        radio_is_on: bool,
+        has_second: bool,
         events: Producer<'static, Event>,
         background_work: Background,
         logged: Consumer<'static, Event>,
@@ -94,8 +93,8 @@ mod app {
 
     #[init(local = [
         adus: [Adu; 2] = [const { Adu::new() }; 2],
-        // The air is half duplex, so no request is received while another is being served.
-        radio_adus: [Adu; 1] = [const { Adu::new() }; 1],
+        // No master sends a request while its last one is being served, and the air is half duplex.
+        second_adus: [Adu; 1] = [const { Adu::new() }; 1],
         device: MaybeUninit<Device> = MaybeUninit::uninit(),
         queue: Queue<Event, 8> = Queue::new(),
     ])]
@@ -103,24 +102,24 @@ mod app {
         let memory = start::Memory {
             device: cx.local.device,
             adus: cx.local.adus,
-            radio_adus: cx.local.radio_adus,
+            second_adus: cx.local.second_adus,
         };
         let mut started = start::up(cx.device, &cx.core.SCB, memory);
         let (events, logged) = cx.local.queue.split();
         started.scan_timer.start();
         started.watchdog.arm();
-        let radio_is_on = started.radio.is_some();
-        let upkeep = Upkeep::new(started.line.is_some(), radio_is_on);
+        let has_second = started.second.is_some();
+        let upkeep = Upkeep::new(started.line.is_some(), has_second);
         (
             Shared {
                 line: started.line,
-                radio: started.radio,
-                radio_uart: started.radio_uart,
+                second: started.second,
+                second_uart: started.second_uart,
                 dacs: started.dacs,
                 device: started.device,
             },
             Local {
-                radio_is_on,
+                has_second,
                 scan_timer: started.scan_timer,
                 upkeep,
                 serving: started.serving,
@@ -176,7 +175,7 @@ mod app {
             .lock(|line| line.as_mut().map(Line::on_alarm));
     }
 
-    #[task(binds = TIM4, priority = 4, local = [scan_timer, upkeep], shared = [line, radio_uart])]
+    #[task(binds = TIM4, priority = 4, local = [scan_timer, upkeep], shared = [line, second_uart])]
     fn beat(mut cx: beat::Context) {
         if cx.local.upkeep.helps() {
             alive::begin(kept::marks(), Task::Beat);
@@ -184,20 +183,20 @@ mod app {
         cx.local.scan_timer.take_beat();
         clock::advance();
         let (upkeep, scan_timer) = (cx.local.upkeep, cx.local.scan_timer);
-        let radio = cx.shared.line.lock(|line| upkeep.run(line, scan_timer));
-        if radio {
+        let second = cx.shared.line.lock(|line| upkeep.run(line, scan_timer));
+        if second {
             cx.shared
-                .radio_uart
-                .lock(|uart| uart.as_mut().map(RadioUart::set_up));
+                .second_uart
+                .lock(|uart| uart.as_mut().map(SecondUart::set_up));
         }
         rtic::pend(interrupt::EXTI1);
     }
 
-    #[task(binds = RADIO, priority = 4, shared = [radio_uart])]
-    fn radio_uart(mut cx: radio_uart::Context) {
-        alive::begin(kept::marks(), Task::RadioUart);
+    #[task(binds = SECOND, priority = 4, shared = [second_uart])]
+    fn second_uart(mut cx: second_uart::Context) {
+        alive::begin(kept::marks(), Task::SecondUart);
         cx.shared
-            .radio_uart
+            .second_uart
             .lock(|uart| uart.as_mut().map(on_interrupt));
     }
 
@@ -205,18 +204,18 @@ mod app {
         binds = SERVE,
         priority = 3,
         local = [serving],
-        shared = [line, radio, device],
+        shared = [line, second, device],
     )]
     fn serve(cx: serve::Context) {
         alive::begin(kept::marks(), Task::Serve);
         let mut shared = cx.shared;
         cx.local
             .serving
-            .run(&mut shared.line, &mut shared.radio, &mut shared.device);
+            .run(&mut shared.line, &mut shared.second, &mut shared.device);
         alive::end(kept::marks(), Task::Serve);
     }
 
-    #[task(binds = EXTI1, priority = 2, local = [scanning, radio_is_on, events], shared = [device, dacs])]
+    #[task(binds = EXTI1, priority = 2, local = [scanning, has_second, events], shared = [device, dacs])]
     fn scan(cx: scan::Context) {
         alive::begin(kept::marks(), Task::Scan);
         alive::end_interrupts(kept::marks());
@@ -226,20 +225,20 @@ mod app {
             .scanning
             .run(&mut shared.device, &mut shared.dacs, cx.local.events);
         alive::end(kept::marks(), Task::Scan);
-        if beat && *cx.local.radio_is_on {
+        if beat && *cx.local.has_second {
             rtic::pend(interrupt::EXTI4);
         }
     }
 
-    #[task(binds = EXTI4, priority = 2, local = [polling: Polling = Polling::new()], shared = [radio, device])]
-    fn radio(cx: radio::Context) {
-        alive::begin(kept::marks(), Task::Radio);
+    #[task(binds = EXTI4, priority = 2, local = [polling: Polling = Polling::new()], shared = [second, device])]
+    fn second(cx: second::Context) {
+        alive::begin(kept::marks(), Task::Second);
         let mut shared = cx.shared;
-        let waits = cx.local.polling.run(&mut shared.radio, &mut shared.device);
+        let waits = cx.local.polling.run(&mut shared.second, &mut shared.device);
         if waits {
             rtic::pend(interrupt::SERVE);
         }
-        alive::end(kept::marks(), Task::Radio);
+        alive::end(kept::marks(), Task::Second);
     }
 
     #[task(binds = EXTI0, priority = 1, local = [background_work, logged], shared = [device, dacs])]

@@ -166,7 +166,7 @@ impl Scanning {
                 interrupt::LINE,
                 interrupt::TIM2,
                 interrupt::TIM1_CC,
-                interrupt::RADIO,
+                interrupt::SECOND,
                 interrupt::SERVE,
                 interrupt::EXTI4,
             ]

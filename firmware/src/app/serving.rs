@@ -20,7 +20,11 @@ use modbus_server::{
 use register_map::codes::Command;
 use rtic::Mutex;
 
-use crate::{board::Device, line::Line, radio::Radio};
+use crate::{
+    board::Device,
+    line::Line,
+    second::{Second, in_use},
+};
 
 /// The unit address of a broadcast.
 const BROADCAST: u8 = 0;
@@ -31,7 +35,7 @@ struct Served {
     line: LineName,
     /// Time from the end of a frame until the line reports it, in ms, rounded up.
     frame_gap_ms: u32,
-    /// RESPONSE_DELAY does not apply. It is for masters on the RS-485 line; the air takes much longer.
+    /// RESPONSE_DELAY does not apply. It is for masters on the RS-485 line; the second line is slower.
     at_once: bool,
     /// The command of the last request, which is executed when its reply has been sent.
     order: Option<Command>,
@@ -42,24 +46,24 @@ pub struct Serving {
     rs485: Served,
     /// This unit's part in function 70, which the RS-485 line serves; `None` on a board without it.
     unit: Option<fast::Unit>,
-    radio: Served,
+    second: Served,
 }
 
 impl Serving {
     /// Creates the servers of a unit. `rs485` is the framing of the RS-485 line and the silence that ends a frame
-    /// there, in ms, rounded up. The radio line reports when a frame has ended itself. `points_only`: the radio line
-    /// serves points and reads only.
+    /// there, in ms, rounded up. The second line reports when a frame has ended itself. `points_only`: the
+    /// second line serves points and reads only.
     pub const fn new(
         unit: u8,
         fast: Option<fast::Unit>,
         rs485: (Framing, u32),
         points_only: bool,
     ) -> Self {
-        let radio = Server::new(Framing::Rtu);
-        let radio = if points_only {
-            radio.with_read_only_diagnostics()
+        let second = Server::new(Framing::Rtu);
+        let second = if points_only {
+            second.with_read_only_diagnostics()
         } else {
-            radio
+            second
         };
         Self {
             rs485: Served {
@@ -71,9 +75,9 @@ impl Serving {
                 order: None,
             },
             unit: fast,
-            radio: Served {
-                server: radio,
-                line: LineName::Radio,
+            second: Served {
+                server: second,
+                line: LineName::Second,
                 frame_gap_ms: 0,
                 at_once: true,
                 order: None,
@@ -85,7 +89,7 @@ impl Serving {
     pub fn run(
         &mut self,
         rs485: &mut impl Mutex<T = Option<Line>>,
-        radio: &mut impl Mutex<T = Option<Radio>>,
+        second: &mut impl Mutex<T = Option<Second>>,
         device: &mut impl Mutex<T = &'static mut Device>,
     ) {
         if let Some(order) = self.rs485.order
@@ -96,15 +100,15 @@ impl Serving {
         }
         // Only a restart affects a reply that is on its way. The other commands are executed before the master can
         // have the reply, because a command of the other line may follow it.
-        if let Some(order) = self.radio.order
-            && radio.lock(|line| {
-                line.as_ref().is_some_and(|line| {
-                    !(line.is_replying() || restarts(order) && line.is_on_air())
+        if let Some(order) = self.second.order
+            && second.lock(|line| {
+                in_use(line).is_some_and(|line| {
+                    !(line.is_replying() || restarts(order) && line.is_ending())
                 })
             })
         {
-            self.radio.order = None;
-            execute(order, self.radio.line, device);
+            self.second.order = None;
+            execute(order, self.second.line, device);
         }
         let mut served = false;
         // The next request waits until the command has been executed.
@@ -112,14 +116,14 @@ impl Serving {
             && let Some(request) = rs485.lock(|line| line.as_mut()?.take())
         {
             self.rs485
-                .serve(request, self.unit.as_mut(), rs485, radio, device);
-            self.change_address(rs485, device);
+                .serve(request, self.unit.as_mut(), rs485, second, device);
+            self.change_address(rs485, second, device);
             served = true;
         }
-        if self.radio.order.is_none()
-            && let Some(request) = radio.lock(|line| line.as_mut()?.take())
+        if self.second.order.is_none()
+            && let Some(request) = second.lock(|line| in_use(line)?.take())
         {
-            self.radio.serve(request, None, rs485, radio, device);
+            self.second.serve(request, None, rs485, second, device);
             served = true;
         }
         if !served {
@@ -127,16 +131,17 @@ impl Serving {
             if let Some(line) = rs485.lock(|line| Some(line.as_ref()?.counters())) {
                 self.rs485.copy_counters(&line, device);
             }
-            if let Some(line) = radio.lock(|line| Some(line.as_ref()?.counters())) {
-                self.radio.copy_counters(&line, device);
+            if let Some(line) = second.lock(|line| Some(in_use(line)?.counters())) {
+                self.second.copy_counters(&line, device);
             }
         }
     }
 
-    /// Puts the unit address in force that a request has set, if any. The other line keeps its address until the restart.
+    /// Puts the unit address in force on both lines that a request has set, if any.
     fn change_address(
         &mut self,
         rs485: &mut impl Mutex<T = Option<Line>>,
+        second: &mut impl Mutex<T = Option<Second>>,
         device: &mut impl Mutex<T = &'static mut Device>,
     ) {
         if HAS_SLOTS {
@@ -150,6 +155,9 @@ impl Serving {
                 fast.set_address(unit);
             }
             rs485.lock(|line| line.as_mut().map(|line| line.set_units(units)));
+            if let Some(units) = line::units(Some(unit), false) {
+                second.lock(|line| in_use(line).map(|line| line.set_units(units)));
+            }
         }
     }
 }
@@ -163,7 +171,7 @@ impl Served {
         mut request: Request<'static>,
         unit: Option<&mut fast::Unit>,
         rs485: &mut impl Mutex<T = Option<Line>>,
-        radio: &mut impl Mutex<T = Option<Radio>>,
+        second: &mut impl Mutex<T = Option<Second>>,
         device: &mut impl Mutex<T = &'static mut Device>,
     ) {
         let mut origin = Origin {
@@ -195,8 +203,8 @@ impl Served {
                 let delay_ms = if self.at_once { 0 } else { delay_ms };
                 rs485.lock(|line| line.as_mut().map(|line| line.send(reply, delay_ms)));
             }
-            (LineName::Radio, _) => {
-                radio.lock(|line| line.as_mut().map(|line| line.send_reply(reply)));
+            (LineName::Second, _) => {
+                second.lock(|line| in_use(line).map(|line| line.send_reply(reply)));
             }
         }
         self.end(ended, outcome, writes, device);

@@ -3,7 +3,7 @@
 use core::mem::MaybeUninit;
 
 use board_support::{
-    Flash, RadioUart, SLOT, ScanTimer, Watchdog, board, boards::SLOTS, flash::FlashError,
+    Flash, SLOT, ScanTimer, SecondUart, Watchdog, board, boards::SLOTS, flash::FlashError,
     gap::LineTimes, kept, pac, stack::LowWater, uart,
 };
 use cortex_m::peripheral::SCB;
@@ -36,8 +36,8 @@ use crate::{
     line::Line,
     log::{self, Log},
     persistence::Persistence,
-    radio::{Radio, Serial},
     scanning::Scanning,
+    second::{self, Second},
     serving::Serving,
     updating::Updating,
 };
@@ -48,8 +48,8 @@ const SERVE_PRIORITY: u8 = 3;
 /// The result of the start-up.
 pub struct Started {
     pub line: Option<Line>,
-    pub radio: Option<Radio>,
-    pub radio_uart: Option<RadioUart>,
+    pub second: Option<Second>,
+    pub second_uart: Option<SecondUart>,
     pub serving: Serving,
     pub device: &'static mut Device,
     pub scanning: Scanning,
@@ -63,7 +63,7 @@ pub struct Started {
 pub struct Memory {
     pub device: &'static mut MaybeUninit<Device>,
     pub adus: &'static mut [Adu],
-    pub radio_adus: &'static mut [Adu],
+    pub second_adus: &'static mut [Adu],
 }
 
 /// Starts everything. The outputs come first: they are set to START as soon as the configuration is known. The line
@@ -74,7 +74,7 @@ pub fn up(
     Memory {
         device: place,
         adus,
-        radio_adus,
+        second_adus,
     }: Memory,
 ) -> Started {
     let mut log = Log::new();
@@ -100,6 +100,7 @@ pub fn up(
     );
     config.set_saves_left(board.saves_left);
     let points_only = config.air_serves_points_only();
+    // A radio does not serve recovery, whose address is the same for all units.
     let radio_config = radio_config.filter(|_| matches!(address, Address::Unit(_)));
     let installed = *config.modules();
     let on_wire = wire_settings(settings);
@@ -196,28 +197,20 @@ pub fn up(
         ))
     });
 
-    let (radio, radio_uart) = radio_config
-        .and_then(|config| {
-            let units = line::units(address.unit(), false)?;
-            let (uart, mode, aux, proof) = board.radio.start(&mut board.rcc)?;
-            let power_on = u16::from(board.reset_cause) & POWER_ON != 0;
-            let radio = Radio::new(
-                Serial(proof),
-                mode,
-                aux,
-                config,
-                units,
-                power_on,
-                radio_adus,
-            );
-            Some((radio, uart))
-        })
-        .unzip();
+    let (second, second_uart) = second::start(
+        board.second,
+        &mut board.rcc,
+        radio_config,
+        address.unit(),
+        u16::from(board.reset_cause) & POWER_ON != 0,
+        second_adus,
+    )
+    .unzip();
 
     Started {
         line,
-        radio,
-        radio_uart,
+        second,
+        second_uart,
         serving: Serving::new(
             identity.unit,
             HAS_EVENTS.then(|| {

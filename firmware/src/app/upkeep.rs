@@ -31,9 +31,9 @@ pub struct Upkeep {
 
 impl Upkeep {
     /// Takes the present settings of the registers as the right ones.
-    pub fn new(line: bool, radio: bool) -> Self {
+    pub fn new(line: bool, second: bool) -> Self {
         Self {
-            registers: Registers::record(&Part, line, radio),
+            registers: Registers::record(&Part, line, second),
             repairs: Repairs::default(),
             others: false,
         }
@@ -45,8 +45,8 @@ impl Upkeep {
         self.repairs.help()
     }
 
-    /// Runs the checks of a millisecond, and the line's response delay. Returns whether the radio's UART must be set
-    /// up.
+    /// Runs the checks of a millisecond, and the line's response delay. Returns whether the UART of the second line must be
+    /// set up.
     #[inline(always)]
     pub fn run(&mut self, line: &mut Option<Line>, scan_timer: &mut ScanTimer) -> bool {
         let is_sending = line.as_ref().is_some_and(Line::is_sending);
@@ -68,6 +68,6 @@ impl Upkeep {
         if self.repairs.end_millisecond(repaired) {
             REPAIRED.store(true, Ordering::Relaxed);
         }
-        wrong == Some(Wrong::Radio)
+        wrong == Some(Wrong::Second)
     }
 }

@@ -32,7 +32,7 @@ impl Lock {
 
 #[cfg(test)]
 mod tests {
-    use super::LineName::{Radio, Rs485};
+    use super::LineName::{Rs485, Second};
     use super::*;
 
     #[test]
@@ -54,11 +54,11 @@ mod tests {
     #[test]
     fn the_lock_is_open_for_the_line_that_opened_it_last() {
         let mut lock = Lock::default();
-        lock.open(Radio);
-        assert!(lock.is_open(Radio) && !lock.is_open(Rs485));
+        lock.open(Second);
+        assert!(lock.is_open(Second) && !lock.is_open(Rs485));
         lock.tick(59_999);
         lock.open(Rs485);
-        assert!(lock.is_open(Rs485) && !lock.is_open(Radio));
+        assert!(lock.is_open(Rs485) && !lock.is_open(Second));
         lock.tick(59_999);
         assert!(lock.is_open(Rs485));
     }

@@ -164,8 +164,8 @@ impl<const SLOTS: usize> Config<SLOTS> {
     /// Exception 06 for a request over the air while the radio serves points and reads only.
     pub const fn check_line(&self) -> Result<(), Exception> {
         match self.origin.line {
-            LineName::Radio if self.points_only => Err(Exception::ServerDeviceBusy),
-            LineName::Radio | LineName::Rs485 => Ok(()),
+            LineName::Second if self.points_only => Err(Exception::ServerDeviceBusy),
+            LineName::Second | LineName::Rs485 => Ok(()),
         }
     }
 
@@ -205,8 +205,12 @@ impl<const SLOTS: usize> Config<SLOTS> {
     fn has(&self, span: Span) -> bool {
         let has = |first: u16, last: u16| u32::from(first) < span.end() && span.start() <= last;
         let lacks_unit = HAS_SLOTS || self.board.switch;
-        let has_radio = HAS_SLOTS || self.board.radio;
-        !(lacks_unit && has(UNIT, UNIT)) && (has_radio || !has(LORA, LORA_FRAME_GAP))
+        !(lacks_unit && has(UNIT, UNIT)) && (self.has_radio() || !has(LORA, LORA_FRAME_GAP))
+    }
+
+    /// Returns whether the second line is a radio.
+    const fn has_radio(&self) -> bool {
+        HAS_SLOTS || self.board.has_radio()
     }
 
     /// Returns whether the board has these registers, and lets them be written.
@@ -254,7 +258,8 @@ impl<const SLOTS: usize> Config<SLOTS> {
             return Err(Exception::IllegalDataValue);
         }
         self.check_line()?;
-        let aired = self.origin.broadcast && self.origin.line == LineName::Radio;
+        let is_aired = self.origin.line == LineName::Second && self.has_radio();
+        let aired = self.origin.broadcast && is_aired;
         let order = words.get(COMMAND.wrapping_sub(span.start()));
         let cannot_save = order == Some(Command::Save.code())
             && (self.save != Save::None || !self.can_pay(span, words));

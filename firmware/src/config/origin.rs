@@ -7,8 +7,8 @@ pub enum LineName {
     /// The RS-485 line.
     #[default]
     Rs485,
-    /// The radio.
-    Radio,
+    /// The second line: a radio or an RS-232 socket.
+    Second,
 }
 
 /// The origin of a request.

@@ -38,7 +38,7 @@ use modbus_server::{
 use modio_drivers::{CHANNELS, Channels};
 use register_map::configuration::COMMAND;
 use register_map::update::status;
-use register_map::{codes::Command, counters, edges, fault, name, radio, state as state_map};
+use register_map::{codes::Command, counters, edges, fault, name, second, state as state_map};
 
 pub use comm_watchdog::CommWatchdog;
 use description::Description;
@@ -104,7 +104,7 @@ enum Block {
     Points,
     Config,
     Pulses,
-    /// Name of the board, state, fault record, counters of the radio, last edges.
+    /// Name of the board, state, fault record, counters of the second line, last edges.
     ReadOnly,
 }
 
@@ -113,7 +113,7 @@ const READ_ONLY: [&[Range<u16>]; 5] = [
     name::SPANS,
     state_map::SPANS,
     fault::SPANS,
-    radio::SPANS,
+    second::SPANS,
     edges::SPANS,
 ];
 
@@ -346,6 +346,12 @@ impl<const SLOTS: usize> Device<SLOTS> {
         }
     }
 
+    /// Returns whether these are counters of a second line that the board does not have.
+    const fn lacks(&self, span: Span) -> bool {
+        let has_second = HAS_SLOTS || self.config.board().second.is_some();
+        !has_second && matches!(span.start(), second::BUS_MESSAGES..=second::T15_GAPS)
+    }
+
     /// Returns a register of the board's name.
     fn name_word(&self, address: u16) -> u16 {
         let index = usize::from(address.wrapping_sub(name::NAME));
@@ -376,7 +382,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
         match address {
             ..state_map::PRODUCT_CODE => self.name_word(address),
             counters::PULSES.. => self.points.input_word(address),
-            fault::KIND..radio::BUS_MESSAGES => self.state.fault_word(address),
+            fault::KIND..second::BUS_MESSAGES => self.state.fault_word(address),
             state_map::STATUS => self.status(),
             state_map::UPDATE => self.update.as_ref().map_or(0, Update::register),
             state_map::DESCRIPTION_CRC => self.description.crc(),
@@ -412,6 +418,7 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
             Block::Points => self.points.check_read_words(span),
             Block::Config => self.config.check_read(span),
             Block::Pulses => check_exists(&[counters::SPANS], span),
+            Block::ReadOnly if self.lacks(span) => Err(Exception::IllegalDataAddress),
             Block::ReadOnly => check_exists(&READ_ONLY, span),
         }
     }

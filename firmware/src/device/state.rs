@@ -1,7 +1,7 @@
 //! Identity and health: the read-only registers at 0x0200 and the fault record at 0x0260.
 
 use modbus_server::Counters;
-use register_map::{Board, codes::ModuleState, fault, points::PORTS, radio, state as at};
+use register_map::{Board, codes::ModuleState, fault, points::PORTS, second, state as at};
 
 use super::identification::{self, SERIAL_LEN};
 use super::points::{Points, words_of};
@@ -63,9 +63,9 @@ pub struct State {
     uptime_s: u32,
     /// The counters of the RS-485 line, copied from its server before a read over this line, and ten times a second.
     counters: Counters,
-    /// The counters of the radio line, copied in the same way. Zero while the radio is off.
-    radio_counters: Counters,
-    /// Whether the radio works; `None` while it is off or being set up for the first time.
+    /// The counters of the second line, copied in the same way. Zero while a radio is off.
+    second_counters: Counters,
+    /// Whether the radio works; `None` without one, and while it is off or being set up for the first time.
     pub radio_works: Option<bool>,
     /// The smallest amount of free stack so far, in bytes.
     pub stack_free: u16,
@@ -85,7 +85,7 @@ impl State {
             part_ms: 0,
             uptime_s: 0,
             counters: Counters::default(),
-            radio_counters: Counters::default(),
+            second_counters: Counters::default(),
             radio_works: None,
             stack_free: 0,
             line_repairs: 0,
@@ -106,7 +106,7 @@ impl State {
     pub const fn counters_of(&mut self, line: LineName) -> &mut Counters {
         match line {
             LineName::Rs485 => &mut self.counters,
-            LineName::Radio => &mut self.radio_counters,
+            LineName::Second => &mut self.second_counters,
         }
     }
 
@@ -208,8 +208,8 @@ impl State {
             }
             _ if address < at::BUS_MESSAGES => nth(&self.identity.unique_id, at::UNIQUE_ID),
             _ if address < at::CHANNEL_STATUS => nth(&self.counters.as_words(), at::BUS_MESSAGES),
-            _ if address >= radio::BUS_MESSAGES => {
-                nth(&self.radio_counters.as_words(), radio::BUS_MESSAGES)
+            _ if address >= second::BUS_MESSAGES => {
+                nth(&self.second_counters.as_words(), second::BUS_MESSAGES)
             }
             _ => points
                 .status_of(address.wrapping_sub(at::CHANNEL_STATUS))

@@ -239,7 +239,7 @@ fn blocks_of_another_line_slot_board_or_place_are_refused() {
     for ((file, records), line, exception) in [
         (
             at(0x180, 0, 64),
-            LineName::Radio,
+            LineName::Second,
             Exception::ServerDeviceBusy,
         ),
         (

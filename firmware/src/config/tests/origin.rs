@@ -1,9 +1,10 @@
 //! Which writes each line may make.
 
 use super::*;
+use register_map::board::FX3U_24;
 
 const OVER_THE_AIR: Origin = Origin {
-    line: LineName::Radio,
+    line: LineName::Second,
     broadcast: false,
     by_serial: false,
 };
@@ -47,7 +48,7 @@ fn the_lock_belongs_to_the_line_that_wrote_key_last() {
 
 #[test]
 fn a_broadcast_over_the_air_writes_nothing_and_one_over_the_cable_does() {
-    for (line, expected) in [(LineName::Rs485, DONE), (LineName::Radio, LOCKED)] {
+    for (line, expected) in [(LineName::Rs485, DONE), (LineName::Second, LOCKED)] {
         let mut config = config(&[(LORA, 1)]);
         config.set_origin(broadcast(line));
         assert_eq!(write(&mut config, KEY, &[OPENING_KEY]), expected);
@@ -67,6 +68,17 @@ fn a_broadcast_over_the_air_writes_nothing_and_one_over_the_cable_does() {
             "the value comes first"
         );
     }
+}
+
+#[test]
+fn a_broadcast_over_rs232_writes_as_one_over_the_cable_does() {
+    let (settings, _) = Settings::load(&FX3U_24, [].into_iter());
+    let mut config = super::super::Config::<8>::new(&FX3U_24, settings, false);
+    config.set_origin(broadcast(LineName::Second));
+    assert_eq!(write(&mut config, KEY, &[OPENING_KEY]), DONE);
+    assert_eq!(write(&mut config, BETA, &[2000]), DONE);
+    config.set_origin(OVER_THE_CABLE);
+    assert_eq!(write(&mut config, BETA, &[2000]), LOCKED);
 }
 
 #[test]

@@ -18,7 +18,7 @@ use modbus_server::line::{Faults, Framing, Port, Receiver};
 use modbus_server::{Adu, Server, crc};
 use modio_drivers::ChannelStatus;
 use modio_drivers::{Kind, Scale};
-use register_map::board::{MODIO_02, MODIO_08};
+use register_map::board::{ETH_IO5R, MODIO_02, MODIO_08};
 use register_map::{Board, Module, configuration as at};
 
 use super::*;

@@ -7,7 +7,7 @@ use crate::config::LineName;
 fn bench(lora: u16) -> Bench {
     let mut bench = Bench::new(Module::Di4, &[(at::LORA, lora)]);
     bench.device.set_origin(Origin {
-        line: LineName::Radio,
+        line: LineName::Second,
         broadcast: false,
         by_serial: false,
     });

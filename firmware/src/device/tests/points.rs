@@ -264,7 +264,7 @@ fn outputs_begin_with_start_and_go_to_safe_in_silence() {
 
 #[test]
 fn comm_source_selects_the_requests_that_restart_the_communication_watchdog() {
-    let lines = [LineName::Rs485, LineName::Radio];
+    let lines = [LineName::Rs485, LineName::Second];
     // Reads and writes over RS-485, then over the air.
     for (source, expected) in [
         (0, [true; 4]),

@@ -43,6 +43,16 @@ fn identity_and_state_are_read_and_never_written() {
 }
 
 #[test]
+fn counters_of_a_second_line_exist_on_boards_with_one() {
+    let modules = [Module::Di4, Module::Di4, Module::Do4, Module::Do4];
+    let mut bench = Bench::on(&ETH_IO5R, modules, &[]);
+    assert_eq!(bench.read(0x0230, 9).map(|words| words.len()), Ok(9));
+    for (first, count) in [(0x0270, 9), (0x0270, 1), (0x0278, 1)] {
+        assert_eq!(bench.read(first, count), Err(2));
+    }
+}
+
+#[test]
 fn counters_include_the_request_that_reads_them() {
     let mut bench = Bench::new(Module::Di4, &[]);
     let requests = state_map::BUS_MESSAGES + 3;

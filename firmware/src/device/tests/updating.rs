@@ -91,7 +91,7 @@ fn preparation_costs_a_save_of_the_budget() {
 fn order_that_was_checked_before_an_order_of_the_other_line_is_not_taken() {
     let mut bench = bench(OfSlot::Confirmed, 1);
     let before = bench.device.config.saves_left();
-    for line in [LineName::Rs485, LineName::Radio] {
+    for line in [LineName::Rs485, LineName::Second] {
         bench.device.carry_out(Command::Prepare, line);
         assert_eq!(bench.device.config.saves_left(), before - 1);
     }
@@ -109,7 +109,7 @@ fn preparation_over_the_air_needs_a_radio_with_settings() {
     for (lora, answer) in [(1, Ok(())), (2, Err(6))] {
         let mut bench = bench(OfSlot::Confirmed, lora);
         bench.device.set_origin(Origin {
-            line: LineName::Radio,
+            line: LineName::Second,
             broadcast: false,
             by_serial: false,
         });

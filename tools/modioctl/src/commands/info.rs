@@ -6,7 +6,7 @@ use modbus_line::names;
 use register_map::configuration::{BAUD, FRAME_GAP};
 use register_map::state::update;
 use register_map::update::State;
-use register_map::{edges, fault, links, name, radio, state};
+use register_map::{edges, fault, links, name, second, state};
 use serde_json::{Map, Value as Json, json};
 
 use crate::bus::{Lost, decode};
@@ -40,7 +40,7 @@ const fn group(address: u16) -> &'static str {
         state::MODULE_IN_FORCE..state::UNIQUE_ID
         | state::CHANNEL_STATUS..fault::KIND
         | edges::LAST_EDGE..links::LINKS => "modules",
-        state::BUS_MESSAGES..state::CHANNEL_STATUS | radio::BUS_MESSAGES..=radio::T15_GAPS => {
+        state::BUS_MESSAGES..state::CHANNEL_STATUS | second::BUS_MESSAGES..=second::T15_GAPS => {
             "counters"
         }
         fault::KIND..=fault::RESERVED => "faults",
@@ -230,7 +230,7 @@ mod tests {
             ("fault_kind", "faults"),
             ("line_repairs", "faults"),
             ("bus_messages", "counters"),
-            ("radio_busy", "counters"),
+            ("line2_busy", "counters"),
         ] {
             assert_eq!(shown(name), Some(group), "{name}");
         }

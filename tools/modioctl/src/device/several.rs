@@ -111,7 +111,7 @@ mod tests {
         // A description may have a longer item than there are addresses.
         let long = [(Word, 0x1000, 0xEFFF), (Word, 0xFFFF, 0xFFFF)];
         assert_eq!(joined(&long).len(), 2);
-        // The fault record and the counters of the radio are two blocks.
+        // The fault record and the counters of the second line are two blocks.
         let blocks = [(Word, 0x026F, 1), (Word, 0x0270, 1), (Word, 0x0271, 1)];
         assert_eq!(joined(&blocks), [(Word, 0x026F, 1), (Word, 0x0270, 2)]);
     }

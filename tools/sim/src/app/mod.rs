@@ -43,6 +43,7 @@ mod pace;
 #[cfg_attr(not(all(unix, not(target_os = "macos"))), path = "no_pty.rs")]
 mod pty;
 mod radio;
+mod rs232;
 mod run;
 mod scenario;
 mod state;
@@ -75,6 +76,8 @@ enum Event {
     Tcp(Weak<clients::Client>, Vec<u8>, Hold),
     /// Bytes from a master, for the gateway radio.
     Radio(Vec<u8>, Hold),
+    /// Bytes from a master, for the RS-232 socket.
+    Rs232(Vec<u8>, Hold),
     /// A request to the HTTP interface, and the receiver of its reply.
     Request(api::Request, tokio::sync::oneshot::Sender<api::Reply>),
     /// From the debugger.
@@ -169,6 +172,11 @@ pub fn run(options: &Options) -> Result<(), String> {
                 .as_deref()
                 .map(|link| pty::Pty::open(Some(link), events.clone(), Event::Radio))
                 .transpose()?,
+            rs232: options
+                .rs232
+                .as_deref()
+                .map(|link| pty::Pty::open(Some(link), events.clone(), Event::Rs232))
+                .transpose()?,
             tcp: options
                 .tcp
                 .map(|address| tcp::Tcp::listen(address, events.clone()))
@@ -211,8 +219,8 @@ pub fn run(options: &Options) -> Result<(), String> {
     if let Some(gdb) = gdb {
         bench.announce("gdb", gdb);
     }
-    if let Some(path) = endpoints.lora() {
-        bench.announce("lora", path.display());
+    for (name, path) in endpoints.others() {
+        bench.announce(name, path.display());
     }
 
     run::until_stopped(

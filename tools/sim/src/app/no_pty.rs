@@ -10,7 +10,7 @@ use super::{Event, Hold};
 pub struct Pty;
 
 impl Pty {
-    /// Opens nothing. The options have refused `--pty` and `--lora` before.
+    /// Opens nothing. The options have refused `--pty`, `--lora` and `--rs232` before.
     ///
     /// # Errors
     ///

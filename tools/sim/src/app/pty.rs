@@ -1,4 +1,4 @@
-//! The RS-485 line, or the gateway radio, on a pseudo-terminal, which a Modbus master opens like a serial port.
+//! The RS-485 line, the gateway radio or the RS-232 socket on a pseudo-terminal, which a Modbus master opens like a serial port.
 //!
 //! The terminal is raw. Bytes are sent on the line at the unit's rate, or with `--fixed-line` at the rate that the
 //! master sets. A pseudo-terminal stores neither the parity nor the length of characters, so the master cannot set the

@@ -39,18 +39,24 @@ pub enum Endpoints {
         tcp: Option<tcp::Tcp>,
         /// The pseudo-terminal of the gateway radio, with `--lora`.
         lora: Option<pty::Pty>,
+        /// The pseudo-terminal of the RS-232 socket, with `--rs232`.
+        rs232: Option<pty::Pty>,
     },
     /// The exact line at this address: virtual time passes when its client asks for it.
     Exact(SocketAddr),
 }
 
 impl Endpoints {
-    /// Returns the pseudo-terminal of the gateway radio.
-    pub fn lora(&self) -> Option<&Path> {
-        match self {
-            Self::Clock { lora, .. } => lora.as_ref()?.path(),
-            Self::Exact(_) => None,
-        }
+    /// Returns the pseudo-terminals that are not those of the RS-485 line, with their names.
+    pub fn others(&self) -> impl Iterator<Item = (&'static str, &Path)> {
+        let (lora, rs232) = match self {
+            Self::Clock { lora, rs232, .. } => (lora.as_ref(), rs232.as_ref()),
+            Self::Exact(_) => (None, None),
+        };
+        let named = [("lora", lora), ("rs232", rs232)];
+        named
+            .into_iter()
+            .filter_map(|(name, pty)| Some((name, pty?.path()?)))
     }
 }
 
@@ -88,7 +94,13 @@ pub fn until_stopped(
         } else {
             IDLE
         };
-        if let Endpoints::Clock { pty, tcp, lora } = endpoints {
+        if let Endpoints::Clock {
+            pty,
+            tcp,
+            lora,
+            rs232,
+        } = endpoints
+        {
             if let Some(baud) = pty.take_rate() {
                 bench.set_client_rate(baud);
             }
@@ -107,6 +119,12 @@ pub fn until_stopped(
                 let bytes = bench.take_received_by_radio();
                 if !bytes.is_empty() {
                     lora.write(&bytes);
+                }
+            }
+            if let Some(rs232) = rs232 {
+                let bytes = bench.take_received_by_rs232();
+                if !bytes.is_empty() {
+                    rs232.write(&bytes);
                 }
             }
             wait = SLICE.saturating_sub(wall.elapsed());
@@ -130,6 +148,10 @@ pub fn until_stopped(
             Ok(Event::Radio(bytes, hold)) => {
                 clock.catch_up(bench);
                 holds.push((bench.send_by_radio(&bytes), hold));
+            }
+            Ok(Event::Rs232(bytes, hold)) => {
+                clock.catch_up(bench);
+                holds.push((bench.send_by_rs232(&bytes), hold));
             }
             Ok(Event::Gateway(message)) => {
                 if let Some(gateway) = &mut attached.gateway {

@@ -1,6 +1,6 @@
 //! The circuit of a modio board: everything that is connected to the pins of the part.
 
-use crate::line::{Line, Settings};
+use crate::line::{Format, Line, Settings};
 use crate::slot::Slot;
 use f103::periph::gpio::{Drive, Gpio};
 use f103::periph::i2c::{Bus, Wires};
@@ -23,6 +23,11 @@ const GRACE: Time = Time::from_ms(5);
 /// Finding when the firmware does not.
 const FLOATING_ENABLE: &str = "the RS-485 driver is on because the firmware does not drive its enable pin, which the board pulls up";
 
+/// Rate and format of the terminal at the RS-232 port, which can be changed.
+const TERMINAL: Settings = Settings {
+    baud: 9600,
+    format: Format::N1,
+};
 /// Finding when the LoRa module is used with bit 7 of OPTION set.
 const FIXED_TRANSMISSION: &str = "the fixed transmission of the LoRa module is not modelled";
 
@@ -66,7 +71,7 @@ impl Modio {
             dip: config.dip,
             dip_at_power_on: config.dip,
             terminals: Terminals::new(config.layout.terminals),
-            rs232: config.layout.rs232.map(|_| Rs232::new(Settings::default())),
+            rs232: config.layout.rs232.map(|_| Rs232::new(TERMINAL)),
             radio: config
                 .radio
                 .map(|stored| Radio::new(stored, config.chip.corner)),

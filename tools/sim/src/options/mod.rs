@@ -91,13 +91,17 @@ pub struct Options {
 
     /// Offer the RS-485 line in virtual time at HOST:PORT, by the exact-line protocol of docs/conformance.md. Time
     /// stands still between its requests, so the endpoints that follow the wall clock are not offered
-    #[arg(long, value_name = "ADDR", value_parser = address, conflicts_with_all = ["pty", "tcp", "modbus_tcp", "gdb", "lora"])]
+    #[arg(long, value_name = "ADDR", value_parser = address, conflicts_with_all = ["pty", "tcp", "modbus_tcp", "gdb", "lora", "rs232"])]
     pub exact_line: Option<SocketAddr>,
 
     /// Fit a LoRa module to every board, and make LINK a symlink to a second pseudo-terminal: the serial side, 9600
     /// 8N1, of a gateway radio on the same air
     #[arg(long, value_name = "LINK")]
     pub lora: Option<PathBuf>,
+
+    /// Make LINK a symlink to a pseudo-terminal of the RS-232 socket of an fx3u, with 9600 8N1; not with several boards
+    #[arg(long, value_name = "LINK", conflicts_with_all = ["units", "bus"])]
+    pub rs232: Option<PathBuf>,
 
     /// Rate and format of the line's client, such as 9600,7N2, whatever the unit does. Without this option the client
     /// has the rate and format of the unit, except 7N2: the unit's UART is set to 8N1 then
@@ -207,7 +211,7 @@ mod tests {
         assert_eq!((options.flash, options.gdb), (None, None));
         assert_eq!((options.modbus_tcp, options.record), (None, None));
         assert_eq!((options.exact_line, options.line), (None, None));
-        assert_eq!(options.lora, None);
+        assert_eq!((options.lora, options.rs232), (None, None));
         assert_eq!(options.run_for, None);
     }
 
@@ -294,6 +298,12 @@ mod tests {
                 &["--exact-line", "127.0.0.1:0", "--lora", "x"][..],
                 "cannot be used with",
             ),
+            (
+                &["--exact-line", "127.0.0.1:0", "--rs232", "x"][..],
+                "cannot be used with",
+            ),
+            (&["--unit", "5", "--rs232", "x"][..], "cannot be used with"),
+            (&["--bus", "x", "--rs232", "x"][..], "cannot be used with"),
             (&["--lora"][..], "--lora <LINK>"),
             (&["--board", "modio-04"][..], "modio-02, modio-08"),
             (&["--slot", "4do"][..], "3=4do"),

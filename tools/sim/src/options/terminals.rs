@@ -1,5 +1,7 @@
 //! Checks of the pseudo-terminals, and of the options that a system without them needs.
 
+use register_map::{Board, board::Second};
+
 use super::{Options, PTY};
 
 impl Options {
@@ -7,11 +9,28 @@ impl Options {
     ///
     /// # Errors
     ///
-    /// In one line: the options to use on a system without pseudo-terminals, or two pseudo-terminals with the same
-    /// link.
+    /// In one line: the options to use on a system without pseudo-terminals, two pseudo-terminals with the same link, or
+    /// a board without an RS-232 socket.
     pub fn check_line(&self) -> Result<(), String> {
-        if self.pty.is_some() && self.pty == self.lora {
-            return Err("--pty and --lora need different links".to_owned());
+        let links = [
+            ("--pty", &self.pty),
+            ("--lora", &self.lora),
+            ("--rs232", &self.rs232),
+        ];
+        for (n, (one, link)) in links.iter().enumerate() {
+            let same = |(_, other): &&(_, _)| link.is_some() && link == other;
+            if let Some((other, _)) = links[n + 1..].iter().find(same) {
+                return Err(format!("{one} and {other} need different links"));
+            }
+        }
+        if self.rs232.is_some() && !has_socket(self.board) {
+            let boards = Board::ALL.into_iter().filter(|board| has_socket(board));
+            let boards: Vec<_> = boards.map(|board| board.name).collect();
+            return Err(format!(
+                "--rs232 needs a board with an RS-232 socket, {}: the {} has none",
+                boards.join(" or "),
+                self.board
+            ));
         }
         if PTY {
             Ok(())
@@ -21,11 +40,12 @@ impl Options {
     }
 
     fn reached_without_pty(&self) -> Result<(), String> {
-        if self.lora.is_some() {
-            return Err(
-                "the simulator has no pseudo-terminals on this system, so it has no --lora"
-                    .to_owned(),
-            );
+        for (name, link) in [("--lora", &self.lora), ("--rs232", &self.rs232)] {
+            if link.is_some() {
+                return Err(format!(
+                    "the simulator has no pseudo-terminals on this system, so it has no {name}"
+                ));
+            }
         }
         let ways = [("--tcp", self.tcp), ("--modbus-tcp", self.modbus_tcp)];
         let names = ways.map(|(name, _)| format!("{name} ADDR")).join(" or ");
@@ -38,6 +58,11 @@ impl Options {
              such as --tcp 127.0.0.1:5020"
         ))
     }
+}
+
+/// Returns whether a board has an RS-232 socket.
+fn has_socket(board: &Board) -> bool {
+    board.second == Some(Second::Rs232)
 }
 
 #[cfg(test)]
@@ -58,14 +83,35 @@ mod tests {
                 "{text}"
             );
         }
-        let text = check(&["--lora", "x", "--tcp", "127.0.0.1:0"]).unwrap_err();
-        assert!(text.contains("no --lora"), "{text}");
+        for option in ["--lora", "--rs232"] {
+            let text = check(&[option, "x", "--tcp", "127.0.0.1:0"]).unwrap_err();
+            assert!(text.ends_with(&format!("no {option}")), "{text}");
+        }
         assert_eq!(parse(&[]).unwrap().check_line().is_ok(), PTY);
     }
 
     #[test]
     fn two_terminals_with_the_same_link_are_refused() {
-        let same = parse(&["--pty", "x", "--lora", "x"]).unwrap().check_line();
-        assert!(same.unwrap_err().contains("different links"));
+        for [one, other] in [
+            ["--pty", "--lora"],
+            ["--pty", "--rs232"],
+            ["--lora", "--rs232"],
+        ] {
+            let same = parse(&[other, "x", one, "x"]).unwrap().check_line();
+            let text = format!("{one} and {other} need different links");
+            assert_eq!(same.unwrap_err(), text);
+        }
+    }
+
+    #[test]
+    fn rs232_on_a_board_without_the_socket_is_refused() {
+        let check = |board| {
+            let arguments = ["--board", board, "--rs232", "x", "--pty", "y"];
+            parse(&arguments).unwrap().check_line()
+        };
+        let text = check("modio-02").unwrap_err();
+        assert!(text.contains("fx3u-14 or fx3u-24: the modio-02"), "{text}");
+        assert!(check("eth-io5r").is_err());
+        assert_eq!(check("fx3u-14").is_ok(), PTY);
     }
 }

@@ -28,6 +28,7 @@ mod bench;
 #[allow(dead_code, reason = "the tests of the modio-08 use the rest")]
 #[path = "../image/fast_master.rs"]
 mod fast_master;
+mod rs232;
 #[path = "../image/timing.rs"]
 mod timing;
 

@@ -3,7 +3,7 @@
 use register_map::{
     codes::Baud,
     configuration::{BAUD, COMMAND, FILTER, LORA_ADDRESS, LORA_AIR_RATE, LORA_FRAME_GAP},
-    fault, radio, state,
+    fault, second, state,
 };
 use sim::Time;
 use sim::radio::{Fault, Parameters};
@@ -183,5 +183,5 @@ fn rs485_line_at_921600_loses_nothing_while_the_radio_is_busy() {
     assert!(replies >= 2, "{replies} replies over the air");
     assert_eq!(bench.registers(state::BUS_ERRORS, 1), Ok(vec![0]));
     assert_eq!(bench.registers(state::OVERRUNS, 2), Ok(vec![0, 0]));
-    assert_eq!(bench.registers(radio::BUS_ERRORS, 1), Ok(vec![0]));
+    assert_eq!(bench.registers(second::BUS_ERRORS, 1), Ok(vec![0]));
 }

@@ -5,7 +5,7 @@ use register_map::{
         COMM_SOURCE, COMM_TIMEOUT, COMMAND, FILTER, KEY, LORA, LORA_AIR_RATE, LORA_FRAME_GAP,
         OPENING_KEY,
     },
-    radio, state,
+    second, state,
 };
 use sim::{Corner, Module, Time};
 
@@ -22,9 +22,9 @@ fn each_line_has_its_own_counters_which_both_lines_show() {
     bench.ask_over_the_air(1, &[0x42]);
     bench.ask_over_the_air(9, &[1, 0, FIRST, 0, 4]);
     bench.over_the_air(&[1, 2, 3, 4, 5]);
-    let on_wire = bench.registers(radio::BUS_MESSAGES, 9).unwrap();
+    let on_wire = bench.registers(second::BUS_MESSAGES, 9).unwrap();
     assert_eq!(on_wire, [5, 1, 1, 4, 0, 0, 0, 0, 0]);
-    let on_air = bench.read_over_the_air(radio::BUS_MESSAGES, 9);
+    let on_air = bench.read_over_the_air(second::BUS_MESSAGES, 9);
     assert_eq!(on_air[..4], [6, 1, 1, 5]);
     let line = bench.read_over_the_air(state::BUS_MESSAGES, 4);
     assert_eq!(line, [1, 0, 0, 1]);

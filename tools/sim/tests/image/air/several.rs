@@ -2,7 +2,7 @@
 
 use register_map::{
     configuration::{FILTER, LORA, LORA_AIR_RATE},
-    radio,
+    second,
 };
 use sim::radio::{Parameters, timing};
 use sim::{Board, Bus, Config, Corner, Module, Time};
@@ -96,7 +96,7 @@ fn three_units_that_are_asked_in_turn_answer_at_once_at_every_air_rate() {
                 assert_eq!(air.read(unit, FILTER, count), vec![5; count.into()]);
             }
             for unit in [2, 3] {
-                let counters = air.read(unit, radio::BUS_MESSAGES, 2);
+                let counters = air.read(unit, second::BUS_MESSAGES, 2);
                 // A unit does not receive its own replies.
                 let others = (1..).zip(air.replies).filter(|(other, _)| *other != unit);
                 let messages = air.requests + others.map(|(_, replies)| replies).sum::<u16>();

@@ -2,7 +2,7 @@
 
 use register_map::{
     configuration::{COMMAND, LORA, LORA_ADDRESS, LORA_AIR_RATE, LORA_CHANNEL, LORA_POWER},
-    radio, state,
+    second, state,
 };
 use sim::radio::{Mode, Parameters};
 use sim::{Config, Module, Time};
@@ -63,7 +63,7 @@ fn radio_that_is_off_leaves_its_pins_alone() {
     assert_eq!(bench.module().mode(), Some(Mode::Sleep));
     assert_eq!(bench.ask_over_the_air(1, &[1, 0, FIRST, 0, 4]), None);
     bench.assert_answers(1);
-    assert_eq!(bench.registers(radio::BUS_MESSAGES, 9), Ok(vec![0; 9]));
+    assert_eq!(bench.registers(second::BUS_MESSAGES, 9), Ok(vec![0; 9]));
 }
 
 #[test]

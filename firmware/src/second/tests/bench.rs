@@ -1,4 +1,4 @@
-//! The radio line of a unit with a simulated module.
+//! The second line of a unit with a simulated module, or with RS-232.
 
 extern crate std;
 use core::convert::Infallible;
@@ -126,9 +126,9 @@ impl InputPin for Pin {
 }
 
 /// Unit 17 with ten registers of value 0x1111.
-pub(super) struct Bench {
+pub(super) struct Bench<P = Lora<Shared, Pin, Pin>> {
     pub(super) module: Shared,
-    pub(super) line: RadioLine<Shared, Pin, Pin>,
+    pub(super) line: SecondLine<P>,
     pub(super) server: Server,
     pub(super) registers: [u16; 10],
     pub(super) now_ms: u32,
@@ -141,7 +141,7 @@ impl Bench {
         module.0.borrow_mut().room = 1000;
         let pin = |mode| Pin(module.clone(), mode);
         let adus = Box::leak(Box::new([Adu::new()]));
-        let line = RadioLine::new(
+        let line = SecondLine::radio(
             module.clone(),
             [pin(true), pin(true)],
             pin(false),
@@ -150,13 +150,7 @@ impl Bench {
             true,
             adus,
         );
-        Self {
-            module,
-            line,
-            server: Server::new(Framing::Rtu),
-            registers: [0x1111; 10],
-            now_ms: 0,
-        }
+        Self::with(module, line)
     }
 
     /// A unit whose radio is ready and has been silent.
@@ -168,6 +162,50 @@ impl Bench {
         assert_eq!(bench.line.works(), Some(true));
         bench.pass(GAP_MS);
         bench
+    }
+
+    #[track_caller]
+    pub(super) fn is_well(&mut self) {
+        for _ in 0..3 {
+            self.receive(&READ);
+            assert_eq!(self.pass(1), Some(Outcome::Accepted));
+            self.pass(2);
+            assert_eq!(self.sent(), REPLY);
+            assert!(!self.line.is_replying());
+            self.pass(SETTINGS.packet_ms());
+            assert!(!self.line.is_ending());
+        }
+    }
+}
+
+impl Bench<Rs232<Shared>> {
+    /// A unit with RS-232 that has been silent.
+    pub(super) fn rs232() -> Self {
+        let mut bench = Self::rs232_starting();
+        bench.pass(10);
+        bench
+    }
+
+    /// A unit with RS-232 that has just started.
+    pub(super) fn rs232_starting() -> Self {
+        let socket = Shared::default();
+        socket.0.borrow_mut().room = 1000;
+        let units = units(Some(17), false).expect("an address");
+        let adus = Box::leak(Box::new([Adu::new()]));
+        let line = SecondLine::rs232(socket.clone(), units, adus);
+        Self::with(socket, line)
+    }
+}
+
+impl<P: Peer> Bench<P> {
+    fn with(module: Shared, line: SecondLine<P>) -> Self {
+        Self {
+            module,
+            line,
+            server: Server::new(Framing::Rtu),
+            registers: [0x1111; 10],
+            now_ms: 0,
+        }
     }
 
     /// Lets milliseconds pass and serves requests as they come. Returns the outcome of the last one.
@@ -205,18 +243,5 @@ impl Bench {
 
     pub(super) fn counters(&self) -> Counters {
         self.server.counters_at(&self.line.counters())
-    }
-
-    #[track_caller]
-    pub(super) fn is_well(&mut self) {
-        for _ in 0..3 {
-            self.receive(&READ);
-            assert_eq!(self.pass(1), Some(Outcome::Accepted));
-            self.pass(2);
-            assert_eq!(self.sent(), REPLY);
-            assert!(!self.line.is_replying());
-            self.pass(SETTINGS.packet_ms());
-            assert!(!self.line.is_on_air());
-        }
     }
 }

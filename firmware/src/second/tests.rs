@@ -1,7 +1,8 @@
-//! Tests of the radio line with a simulated module.
+//! Tests of the second line as a radio, with a simulated module.
 
 extern crate std;
 mod bench;
+mod rs232;
 
 use std::vec::Vec;
 
@@ -263,15 +264,15 @@ fn reply_ends_when_the_radio_has_sent_it() {
     bench.now_ms += 1;
     assert!(bench.line.poll(bench.now_ms, 1), "the module has the reply");
     assert!(!bench.line.is_replying());
-    assert!(bench.line.is_on_air(), "the last packet");
+    assert!(bench.line.is_ending(), "the last packet");
     for _ in 1..SETTINGS.packet_ms() {
         bench.now_ms += 1;
         assert!(!bench.line.poll(bench.now_ms, 1));
-        assert!(bench.line.is_on_air());
+        assert!(bench.line.is_ending());
     }
     bench.now_ms += 1;
     assert!(bench.line.poll(bench.now_ms, 1), "the reply has been sent");
-    assert!(!bench.line.is_on_air());
+    assert!(!bench.line.is_ending());
     bench.is_well();
 }
 

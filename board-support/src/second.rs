@@ -1,23 +1,24 @@
-//! The radio's UART, USART3 on PB10 and PB11 at 9600 8N1, and its pins M0, M1 and AUX.
+//! The UART of the second line, at 9600 8N1, and the pins M0, M1 and AUX of a radio.
 //!
-//! [`RadioUart::on_interrupt`] moves one byte in each direction. It runs from RAM, so that no byte is lost while flash
+//! [`SecondUart::on_interrupt`] moves one byte in each direction. It runs from RAM, so that no byte is lost while flash
 //! is erased or programmed.
 
-use stm32f1xx_hal::{
-    pac,
-    rcc::{Enable, Reset},
-};
+use stm32f1xx_hal::pac;
 
 use crate::{
     ClockSource, IoPin,
-    boards::BOARD,
+    boards::{BOARD, RadioPins, SecondPins},
     fitted::{self, Fitted},
-    pin::{Mode, Pin},
-    uart::divider,
+    pin::Mode,
+    uart::{LineSettings, divider},
+    usart::Usart,
 };
 
-/// Baud rate of the radio module. In sleep mode it has no other.
-const BAUD: u32 = 9600;
+/// The UART. Without a second line there is no proof of one, so this is never used.
+const UART: Usart = match BOARD.second {
+    Some(SecondPins { uart, .. }) => uart,
+    None => Usart::Usart3,
+};
 
 const FE: u16 = 1 << 1;
 const ORE: u16 = 1 << 3;
@@ -27,58 +28,76 @@ const TXE: u16 = 1 << 7;
 /// CR1: UE, TE, RE and RXNEIE; words of eight bits without parity (RM0008 27.6.4).
 const RECEIVING: u16 = 1 << 13 | 1 << 3 | 1 << 2 | 1 << 5;
 
-/// The radio before it is set up.
-pub struct RadioOff {
-    pub(crate) usart: pac::USART3,
+/// The second line before it is set up.
+pub struct SecondOff {
     pub(crate) clock: ClockSource,
 }
 
 /// The UART.
-pub struct RadioUart {
-    usart: pac::USART3,
+pub struct SecondUart {
     divider: u16,
     _fitted: Proof,
 }
 
-/// Proof that the board has a radio.
-pub type Proof = <fitted::Radio as Fitted>::Proof;
+/// The pins of a radio, set up.
+pub struct RadioIo {
+    /// M0 and M1.
+    pub mode: [IoPin; 2],
+    /// AUX.
+    pub aux: IoPin,
+}
 
-/// A byte from the radio, or a damaged or lost one.
+/// Proof that the board has a second line.
+pub type Proof = <fitted::Second as Fitted>::Proof;
+
+/// Error for a byte that was received damaged, or lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Damaged;
 
-impl RadioOff {
-    /// Sets up the UART and the pins: M0 and M1, which are high as the module pulls them, so that it is asleep until it
-    /// has its settings, and AUX, which is pulled up. Returns also the proof that the board has a radio.
-    /// Returns `None` when the board has no radio, or the clock cannot produce the baud rate; the radio then stays off.
+impl SecondOff {
+    /// Sets up the UART. Returns also the proof that the board has a second line. Returns `None` when it has none, or the
+    /// clock cannot produce the baud rate; the line then stays off.
     #[must_use]
-    pub fn start(self, rcc: &mut pac::RCC) -> Option<(RadioUart, [IoPin; 2], IoPin, Proof)> {
-        let (pins, proof) = (BOARD.radio?, fitted::Radio::proof()?);
-        let divider = divider(self.clock.apb1_hz(), BAUD)?;
-        pac::USART3::enable(rcc);
-        pac::USART3::reset(rcc);
-        let mut uart = RadioUart {
-            usart: self.usart,
+    pub fn start(self, rcc: &mut pac::RCC) -> Option<(SecondUart, Proof)> {
+        let proof = fitted::Second::proof()?;
+        let divider = divider(UART.hz(self.clock), LineSettings::SECOND.baud)?;
+        UART.enable(rcc);
+        let mut uart = SecondUart {
             divider,
             _fitted: proof,
         };
         uart.set_up();
         // The transmitter is on and drives high before the pin becomes its output.
-        Pin::b(10).configure(Mode::Peripheral);
-        Pin::b(11).pull_up();
-        let [m0, m1] = pins.mode;
-        let mode = [IoPin::high(m0), IoPin::high(m1)];
-        Some((uart, mode, IoPin::pulled_up(pins.aux), proof))
+        UART.tx().configure(Mode::Peripheral);
+        UART.rx().pull_up();
+        Some((uart, proof))
     }
 }
 
-impl RadioUart {
+impl RadioIo {
+    /// Sets up the pins of a radio: M0 and M1, which are high as the module pulls them, so that it is asleep until it has
+    /// its settings, and AUX, which is pulled up. Returns `None` when the second line is no radio.
+    #[must_use]
+    #[inline(always)]
+    pub fn start() -> Option<Self> {
+        let RadioPins {
+            mode: [m0, m1],
+            aux,
+        } = BOARD.second?.radio?;
+        Some(Self {
+            mode: [IoPin::high(m0), IoPin::high(m1)],
+            aux: IoPin::pulled_up(aux),
+        })
+    }
+}
+
+impl SecondUart {
     /// Sets every register of the UART up. A byte under way is lost. Runs from RAM, because a disturbed UART is set
     /// up again while flash may be busy.
     #[inline(never)]
     #[unsafe(link_section = ".ram_code")]
     pub fn set_up(&mut self) {
-        let usart = &self.usart;
+        let usart = UART.registers();
         usart.cr1().reset();
         usart.cr3().reset();
         usart.cr2().reset();
@@ -98,7 +117,7 @@ impl RadioUart {
         received: impl FnOnce(Result<u8, Damaged>),
         next: impl FnOnce() -> Option<u8>,
     ) {
-        let usart = &self.usart;
+        let usart = UART.registers();
         let flags = usart.sr().read().bits();
         if flags & (RXNE | ORE) != 0 {
             let byte = usart.dr().read().bits() as u8;

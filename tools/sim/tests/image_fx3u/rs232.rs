@@ -1,0 +1,293 @@
+//! The RS-232 socket: a second Modbus line with 9600 8N1.
+
+use register_map::codes::Baud;
+use register_map::configuration::{BAUD, BETA, COMMAND, KEY, LORA, OPENING_KEY, UNIT};
+use register_map::name::UNIT_BY_SERIAL;
+use register_map::{second, state};
+use sim::Time;
+use sim::board::terminals::Value;
+use sim::line::{Format, Settings};
+
+use crate::bench::{Bench, adu};
+use crate::{board, set, unit, words};
+
+/// Rate and format of the socket.
+const SOCKET: Settings = Settings {
+    baud: 9600,
+    format: Format::N1,
+};
+/// Unit 1 reads three points, and the reply while X0 to X2 are off.
+const READ: [u8; 6] = [1, 2, 0, 0, 0, 3];
+const REPLY: [u8; 4] = [1, 2, 1, 0];
+
+/// Sends bytes at the socket without a gap, and returns what the board sends in the next 80 ms.
+fn exchange(bench: &mut Bench, bytes: &[u8]) -> Vec<u8> {
+    let now = bench.board.now();
+    let end = bench.board.rs232().unwrap().send(now, bytes);
+    bench.board.run_until(end + Time::from_ms(80));
+    let received = bench.board.rs232().unwrap().take_received();
+    received.into_iter().map(|byte| byte.byte).collect()
+}
+
+/// Sends a request at the socket and returns the reply without its CRC, or nothing. Checks the CRC.
+fn ask(bench: &mut Bench, request: &[u8]) -> Vec<u8> {
+    let mut reply = exchange(bench, &adu(request));
+    if !reply.is_empty() {
+        let body = reply[..reply.len() - 2].to_vec();
+        assert_eq!(reply, adu(&body));
+        reply = body;
+    }
+    reply
+}
+
+fn write(bench: &mut Bench, unit: u8, address: u16, value: u16) {
+    let [a, b] = address.to_be_bytes();
+    let [c, d] = value.to_be_bytes();
+    let request = [unit, 6, a, b, c, d];
+    let expected = if unit == 0 { &[][..] } else { &request };
+    assert_eq!(ask(bench, &request), expected);
+}
+
+/// A master that asks again as soon as it has a reply and a silence has passed.
+struct Master {
+    request: Vec<u8>,
+    reply: Vec<u8>,
+    received: Vec<u8>,
+    /// The next request begins then; `None` while the reply is missing.
+    next: Option<Time>,
+    /// End of the last request.
+    asked: Time,
+    /// Number of requests, and the longest time until a reply was complete.
+    count: u16,
+    longest: Time,
+}
+
+impl Master {
+    fn new(request: &[u8], reply: &[u8]) -> Self {
+        Self {
+            request: adu(request),
+            reply: adu(reply),
+            received: Vec::new(),
+            next: Some(Time::ZERO),
+            asked: Time::ZERO,
+            count: 0,
+            longest: Time::ZERO,
+        }
+    }
+
+    /// Takes what was received until `now`. Returns the request that must be sent now, if any.
+    fn step(&mut self, now: Time, received: impl Iterator<Item = u8>) -> Option<&[u8]> {
+        self.received.extend(received);
+        if self.next.is_none() && self.received.len() >= self.reply.len() {
+            assert_eq!(self.received, self.reply);
+            self.received.clear();
+            self.longest = self.longest.max(now - self.asked);
+            self.next = Some(now + Time::from_ms(4));
+        }
+        assert!(
+            self.next.is_some() || now < self.asked + Time::from_ms(200),
+            "request {} got no reply, but {:02X?}",
+            self.count,
+            self.received
+        );
+        self.next.take_if(|at| *at <= now)?;
+        self.count += 1;
+        self.asked = now;
+        Some(&self.request)
+    }
+}
+
+/// Lets a master at each line ask for this time, up to the last reply.
+fn poll(bench: &mut Bench, [line, socket]: [&mut Master; 2], time: Time) {
+    let end = bench.board.now() + time;
+    while bench.board.now() < end || line.next.is_none() || socket.next.is_none() {
+        bench.board.run_for(Time::from_us(500));
+        let now = bench.board.now();
+        let received = bench.board.line().take_received();
+        assert!(received.iter().all(sim::line::Received::is_good));
+        if let Some(request) = line.step(now, received.iter().map(|byte| byte.byte)) {
+            line.asked = bench.board.line().send(now, request);
+        }
+        let received = bench.board.rs232().unwrap().take_received();
+        if let Some(request) = socket.step(now, received.iter().map(|byte| byte.byte)) {
+            socket.asked = bench.board.rs232().unwrap().send(now, request);
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn masters_at_both_lines_get_every_reply_and_each_line_has_its_counters() {
+    for baud in [Baud::B9600, Baud::B115200, Baud::B921600] {
+        let mut bench = unit(&[(BAUD, baud.code())]);
+        bench.settings(Settings {
+            baud: u32::from(baud.code()) * 100,
+            format: Format::N2,
+        });
+        let mut line = Master::new(&READ, &REPLY);
+        let mut socket = Master::new(&[1, 3, 0, 0, 0, 1], &[1, 3, 2, 0, 0]);
+        poll(&mut bench, [&mut line, &mut socket], Time::from_secs(2));
+        assert!(line.count > 60 && socket.count > 60);
+        // The counters of the other line are up to 100 ms old.
+        bench.board.run_for(Time::from_ms(150));
+        let read = words(&mut bench, second::BUS_MESSAGES, 9);
+        let expected = [socket.count, 0, 0, socket.count, 0, 0, 0, 0, 0];
+        assert_eq!(read, expected, "{baud:?}");
+        let read = words(&mut bench, state::BUS_MESSAGES, 9);
+        let count = line.count + 2;
+        assert_eq!(read, [count, 0, 0, count, 0, 0, 0, 0, 0]);
+        let [a, b] = second::BUS_MESSAGES.to_be_bytes();
+        let [c, d] = (socket.count + 1).to_be_bytes();
+        assert_eq!(ask(&mut bench, &[1, 3, a, b, 0, 1]), [1, 3, 2, c, d]);
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn save_while_both_masters_ask_loses_no_reply() {
+    let mut bench = unit(&[]);
+    let mut line = Master::new(&READ, &REPLY);
+    let mut socket = Master::new(&READ, &REPLY);
+    // More saves than fit in a page, so that pages are erased.
+    for beta in 3000..3020 {
+        write(&mut bench, 1, KEY, OPENING_KEY);
+        write(&mut bench, 1, BETA, beta);
+        write(&mut bench, 1, COMMAND, 1);
+        poll(&mut bench, [&mut line, &mut socket], Time::from_ms(300));
+    }
+    // A reply waits for an erase, for up to 40 ms.
+    assert!(socket.longest < Time::from_ms(70), "{}", socket.longest);
+    bench.board.cycle();
+    bench.board.run_for(Time::from_ms(200));
+    let [a, b] = BETA.to_be_bytes();
+    let [c, d] = 3019_u16.to_be_bytes();
+    assert_eq!(ask(&mut bench, &[1, 3, a, b, 0, 1]), [1, 3, 2, c, d]);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn reply_begins_after_t35() {
+    let mut bench = unit(&[]);
+    for n in 0..20 {
+        let start = bench.board.now() + Time::from_us(137 * n);
+        let end = bench.board.rs232().unwrap().send(start, &adu(&READ));
+        bench.board.run_until(end + Time::from_ms(30));
+        let reply = bench.board.rs232().unwrap().take_received();
+        let bytes: Vec<u8> = reply.iter().map(|byte| byte.byte).collect();
+        assert_eq!(bytes, adu(&REPLY));
+        let silence = reply[0].start - end;
+        assert!(silence > Time::from_us(3_646), "{silence}");
+        assert!(silence < Time::from_us(5_500), "{silence}");
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn frames_that_are_t35_apart_are_two_and_a_shorter_pause_ends_none() {
+    let mut bench = unit(&[]);
+    write(&mut bench, 1, KEY, OPENING_KEY);
+    let [a, b] = BETA.to_be_bytes();
+    for n in 0..20 {
+        // A broadcast, and a request that reads what it has written.
+        let start = bench.board.now() + Time::from_us(137 * u64::from(n));
+        let port = bench.board.rs232().unwrap();
+        let end = port.send(start, &adu(&[0, 6, a, b, 0x0B, 0xB8 + n]));
+        let request = adu(&[1, 3, a, b, 0, 1]);
+        let end = port.send(end + Time::from_us(3_750), &request[..5]);
+        port.send(end + Time::from_us(2_500), &request[5..]);
+        bench.board.run_for(Time::from_ms(100));
+        let reply = bench.board.rs232().unwrap().take_received();
+        let bytes: Vec<u8> = reply.iter().map(|byte| byte.byte).collect();
+        assert_eq!(bytes, adu(&[1, 3, 2, 0x0B, 0xB8 + n]));
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn damaged_frame_gets_silence_and_is_counted() {
+    let mut bench = unit(&[]);
+    let mut errors = 0;
+    let mut wrong_crc = adu(&READ);
+    wrong_crc[7] ^= 1;
+    assert_eq!(exchange(&mut bench, &wrong_crc), []);
+    errors += 1;
+    // A pause of t3.5 makes two frames, both damaged.
+    let now = bench.board.now();
+    let port = bench.board.rs232().unwrap();
+    let end = port.send(now, &adu(&READ)[..4]);
+    port.send(end + Time::from_us(5_100), &adu(&READ)[4..]);
+    bench.board.run_for(Time::from_ms(80));
+    assert_eq!(bench.board.rs232().unwrap().take_received(), []);
+    errors += 2;
+    // Stop bits are missing at half the rate.
+    let port = bench.board.rs232().unwrap();
+    port.set_settings(Settings {
+        baud: 4800,
+        ..SOCKET
+    });
+    exchange(&mut bench, &adu(&READ));
+    bench.board.rs232().unwrap().set_settings(SOCKET);
+    errors += 1;
+    assert_eq!(ask(&mut bench, &READ), REPLY);
+    let [a, b] = second::BUS_MESSAGES.to_be_bytes();
+    let reply = ask(&mut bench, &[1, 3, a, b, 0, 2]);
+    assert_eq!(reply, [1, 3, 4, 0, 2, 0, errors]);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn function_70_is_exception_01_and_lora_does_not_exist() {
+    let mut bench = unit(&[]);
+    assert_eq!(ask(&mut bench, &[1, 0x46, 1]), [1, 0xC6, 1]);
+    for scan in [1, 2, 4, 8, 16] {
+        assert_eq!(ask(&mut bench, &[0xFD, 0x46, scan]), []);
+    }
+    let [a, b] = LORA.to_be_bytes();
+    assert_eq!(ask(&mut bench, &[1, 3, a, b, 0, 1]), [1, 0x83, 2]);
+    assert_eq!(ask(&mut bench, &[1, 6, a, b, 0, 1]), [1, 0x86, 2]);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn settings_are_written_by_broadcast_and_a_restart_follows_its_whole_reply() {
+    let mut bench = unit(&[]);
+    bench.tolerant = true;
+    write(&mut bench, 0, KEY, OPENING_KEY);
+    write(&mut bench, 0, BETA, 3021);
+    let [a, b] = BETA.to_be_bytes();
+    assert_eq!(bench.ask(1, &[3, a, b, 0, 1]).unwrap(), [3, 2, 0x0B, 0xCD]);
+    for n in 1..=5 {
+        write(&mut bench, 1, KEY, OPENING_KEY);
+        // Its reply, and no byte of the restart.
+        write(&mut bench, 1, COMMAND, 2);
+        bench.board.run_for(Time::from_ms(200));
+        assert_eq!(bench.board.resets(), n);
+        assert_eq!(ask(&mut bench, &READ), REPLY);
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn address_is_that_of_the_rs485_line_also_when_it_changes_and_in_recovery() {
+    let mut bench = unit(&[]);
+    let serial = words(&mut bench, state::SERIAL_NUMBER, 2);
+    let serial: Vec<u8> = serial.into_iter().flat_map(u16::to_be_bytes).collect();
+    let [a, b] = UNIT_BY_SERIAL.to_be_bytes();
+    bench.exchange(&adu(
+        &[&[0xFD, 0x46, 8][..], &serial, &[6, a, b, 0, 42]].concat()
+    ));
+    assert_eq!(ask(&mut bench, &READ), []);
+    assert_eq!(ask(&mut bench, &[42, 2, 0, 0, 0, 3]), [42, 2, 1, 0]);
+    drop(bench);
+
+    let mut bench = Bench::with(board(&[(UNIT, 9)]));
+    bench.tolerant = true;
+    assert_eq!(ask(&mut bench, &[9, 2, 0, 0, 0, 3]), [9, 2, 1, 0]);
+    for on in [true, false] {
+        bench.board.run_for(Time::from_ms(500));
+        set(&mut bench, "RUN", Value::Switch(on));
+    }
+    bench.board.run_for(Time::from_ms(500));
+    assert_eq!(ask(&mut bench, &[9, 2, 0, 0, 0, 3]), []);
+    assert_eq!(ask(&mut bench, &[255, 2, 0, 0, 0, 3]), [255, 2, 1, 0]);
+}
