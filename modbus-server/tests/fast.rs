@@ -591,3 +591,16 @@ fn write_of_4611_after_a_request_to_an_absent_serial_number_is_served() {
         );
     }
 }
+
+#[test]
+fn write_of_4611_with_a_gap_in_the_frame_is_served() {
+    let mut unit = Unit::new(Part::Everything);
+    let frame = with_crc(&[ADDRESS, 6, 0, 0, 0x46, 0x11]);
+    unit.characters(&frame[..3]);
+    assert!(!unit.port.short_silence(0));
+    unit.characters(&frame[3..]);
+    assert!(
+        unit.port.long_silence(0),
+        "gaps are only counted without STRICT_T15"
+    );
+}
