@@ -109,3 +109,19 @@ fn output_that_is_changed_by_less_than_the_deadband_is_reported() {
     bench.scan_port(0, |_| {});
     assert_eq!(bench.device.waiting().count, 1);
 }
+
+#[test]
+fn edge_of_an_input_that_was_switched_off_is_not_reported() {
+    let mut bench = Bench::on(&MODIO_08, MODULES, &[]);
+    bench.scan(|channels| channels.set_bit(0, false));
+    for setting in [Setting::Low, Setting::Off] {
+        let device = &mut bench.device;
+        device.events.set(device.points.ports(), 0, 2, 0, setting);
+        if setting == Setting::Low {
+            fetch(&mut bench);
+            bench.scan(|channels| channels.set_bit(0, true));
+            assert_eq!(bench.device.waiting().count, 1);
+        }
+    }
+    assert_eq!(bench.device.waiting().count, 0);
+}
