@@ -129,4 +129,31 @@ mod tests {
         let again = [(0, false), (1_000, true), (1_500, false), (4_000, true)];
         assert_eq!(end(held, &again), None, "released and pressed again");
     }
+
+    #[test]
+    fn switch_moved_twice_when_the_milliseconds_have_wrapped_is_no_gesture() {
+        let mut watch = Watch::new(Gesture::Moved(Pin::b(2)));
+        let start = (0..6_000).step_by(10);
+        assert!(!start.fold(false, |ends, now| ends | watch.step(now, false)));
+        // 49.7 days later.
+        let mut ends = false;
+        for ms in (0..5_000_u32).step_by(10) {
+            let now = ms.wrapping_sub(1_000);
+            ends |= watch.step(now, (2_000..3_000).contains(&ms));
+        }
+        assert!(!ends);
+    }
+
+    #[test]
+    fn button_that_is_pressed_before_the_milliseconds_wrap_and_released_after_is_no_gesture() {
+        let mut watch = Watch::new(Gesture::Held(Pin::b(8)));
+        let start = (0..6_000).step_by(10);
+        assert!(!start.fold(false, |ends, now| ends | watch.step(now, true)));
+        let mut ends = false;
+        for ms in (0..6_000_u32).step_by(10) {
+            let now = ms.wrapping_sub(1_000);
+            ends |= watch.step(now, !(500..4_000).contains(&ms));
+        }
+        assert!(!ends);
+    }
 }

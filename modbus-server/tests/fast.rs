@@ -568,3 +568,39 @@ fn errors_count_again_after_the_silence_behind_a_reply() {
     unit.characters(&usual);
     assert!(unit.port.long_silence(0));
 }
+
+/// Returns the answer of a unit to a write of `value` to register 0, after `before` was received.
+fn write_after(unit: &mut Unit, value: [u8; 2]) -> Answer {
+    unit.ask(&[ADDRESS, 6, 0, 0, value[0], value[1]])
+}
+
+#[test]
+fn write_of_4611_after_a_request_to_an_absent_serial_number_is_served() {
+    let mut unit = Unit::new(Part::Everything);
+    let usual = |value: [u8; 2]| Answer::Usual(with_crc(&[ADDRESS, 6, 0, 0, value[0], value[1]]));
+    assert_eq!(write_after(&mut unit, [0x46, 0x11]), usual([0x46, 0x11]));
+    // A read of a unit with another serial number, which is not on the line: no reply follows.
+    let absent = unit.ask(&bytes("FD 46 08 00 00 00 01 03 00 00 00 01"));
+    assert_eq!(absent, Answer::Silence);
+    assert!(!unit.port.long_silence(0));
+    for attempt in 0..3 {
+        assert_eq!(
+            write_after(&mut unit, [0x46, 0x11]),
+            usual([0x46, 0x11]),
+            "attempt {attempt}"
+        );
+    }
+}
+
+#[test]
+fn write_of_4611_with_a_gap_in_the_frame_is_served() {
+    let mut unit = Unit::new(Part::Everything);
+    let frame = with_crc(&[ADDRESS, 6, 0, 0, 0x46, 0x11]);
+    unit.characters(&frame[..3]);
+    assert!(!unit.port.short_silence(0));
+    unit.characters(&frame[3..]);
+    assert!(
+        unit.port.long_silence(0),
+        "gaps are only counted without STRICT_T15"
+    );
+}

@@ -152,3 +152,23 @@ fn address_is_written_by_serial_number_and_stored_alone() {
     assert_eq!(config.check_unit(Some(6)), Err(Exception::ServerDeviceBusy));
     assert_eq!(config.check_unit(Some(5)), Ok(()), "nothing to store");
 }
+
+#[test]
+fn address_in_force_by_serial_number_needs_no_restart_although_it_was_saved_before() {
+    let mut config = on::<4>(&ETH_IO5R, &[]);
+    assert_eq!(write(&mut config, UNIT, &[5]), DONE);
+    config.compare();
+    config.begin_save();
+    let changed = config.to_save().needs_restart(&config.started());
+    config.end_save(changed);
+    assert_ne!(config.status() & status::RESTART_NEEDED, 0);
+    config.set_origin(Origin {
+        by_serial: true,
+        ..Origin::default()
+    });
+    assert_eq!(config.check_unit(Some(5)), Ok(()));
+    config.set_unit(5);
+    config.compare();
+    assert!(!config.is_saving());
+    assert_eq!(config.status() & status::RESTART_NEEDED, 0);
+}

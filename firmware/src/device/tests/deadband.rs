@@ -93,3 +93,35 @@ fn deadbands_are_settings_in_force_now_that_a_change_of_the_module_sets_to_0() {
     bench.write(at::MODULE + 1, &[6]).unwrap();
     assert_eq!(bench.read(DEADBAND, 32).unwrap(), [0; 32]);
 }
+
+#[test]
+fn output_that_is_changed_by_less_than_the_deadband_is_reported() {
+    let modules = [Module::Ao4, Module::None, Module::None, Module::None];
+    let mut bench = Bench::on(&MODIO_08, modules, &[]);
+    let device = &mut bench.device;
+    let on = device
+        .events
+        .set(device.points.ports(), 0, 3, 0, Setting::Low);
+    assert!(on);
+    fetch(&mut bench);
+    bench.ask(&[6, 0, 0, 0, 14]);
+    bench.device.tick(100);
+    bench.scan_port(0, |_| {});
+    assert_eq!(bench.device.waiting().count, 1);
+}
+
+#[test]
+fn edge_of_an_input_that_was_switched_off_is_not_reported() {
+    let mut bench = Bench::on(&MODIO_08, MODULES, &[]);
+    bench.scan(|channels| channels.set_bit(0, false));
+    for setting in [Setting::Low, Setting::Off] {
+        let device = &mut bench.device;
+        device.events.set(device.points.ports(), 0, 2, 0, setting);
+        if setting == Setting::Low {
+            fetch(&mut bench);
+            bench.scan(|channels| channels.set_bit(0, true));
+            assert_eq!(bench.device.waiting().count, 1);
+        }
+    }
+    assert_eq!(bench.device.waiting().count, 0);
+}

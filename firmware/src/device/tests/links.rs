@@ -399,3 +399,32 @@ fn links_of_a_port_rest_after_a_change_of_its_module() {
     bench.press(0);
     assert_eq!(bench.ask(&[1, 0, 4, 0, 4]), [1, 1, 0b0001]);
 }
+
+#[test]
+fn edge_of_a_scan_reaches_a_link_although_a_setting_is_written_before_the_links_run() {
+    let mut bench = linked(link(0, Follow, [0; 2]), NONE);
+    // As `Scanning::run` does it: the inputs under one lock, then the links under others. A request is served in between.
+    let mut channels = *bench.device.points.ports()[0].channels();
+    channels.set_bit(0, true);
+    bench.device.scanned(0, &channels, true, false);
+    bench.write(at::RESPONSE_DELAY, &[1]).unwrap();
+    (0..4).for_each(|slot| bench.device.run_links(slot));
+    assert!(bench.output(), "the edge was lost");
+}
+
+#[test]
+fn change_of_the_scale_of_an_analog_source_is_no_edge() {
+    // 2000 raw is 4884 mV.
+    let mut bench = linked(link(ANALOG, Follow, [4000, 3000]), NONE);
+    bench.word(2000);
+    assert!(!bench.output());
+    bench.write(at::SCALE + ANALOG, &[1]).unwrap();
+    let mut channels = *bench.device.points.ports()[2].channels();
+    channels.set_word(0, 4884);
+    // The scan under way when the setting was written, then the first one with the new scale.
+    for words in [false, true] {
+        bench.device.scanned(2, &channels, words, false);
+        (0..4).for_each(|slot| bench.device.run_links(slot));
+    }
+    assert!(!bench.output(), "the input has not changed");
+}
