@@ -125,7 +125,7 @@ fn masters_at_both_lines_get_every_reply_and_each_line_has_its_counters() {
             format: Format::N2,
         });
         let mut line = Master::new(&READ, &REPLY);
-        let mut socket = Master::new(&[1, 3, 0, 0, 0, 1], &[1, 3, 2, 0, 0]);
+        let mut socket = Master::new(&[1, 3, 1, 10, 0, 1], &[1, 3, 2, 0, 1]);
         poll(&mut bench, [&mut line, &mut socket], Time::from_secs(2));
         assert!(line.count > 60 && socket.count > 60);
         // The counters of the other line are up to 100 ms old.
