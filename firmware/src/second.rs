@@ -13,7 +13,7 @@
 
 use board_support::uart::LineSettings;
 use embedded_hal::digital::{InputPin, OutputPin};
-use embedded_hal_nb::serial::{ErrorType, Read, Write};
+use embedded_hal_nb::serial::{Read, Write};
 use modbus_server::{
     Adu, LineCounters, Reply, Request,
     line::{Faults, Gaps, Port, Receiver},
@@ -22,94 +22,11 @@ use modio_drivers::Lora;
 
 use crate::{config::RadioConfig, line::Units};
 
-/// What is at the UART of the second line. Bytes are read and written only when it is ready.
-pub trait Peer: Read<u8> + Write<u8> {
-    /// It is a radio, which can fail, and which receives a frame with pauses inside.
-    const IS_RADIO: bool;
+mod peer;
+#[cfg(test)]
+mod tests;
 
-    /// Continues its set-up, `passed` milliseconds after the last call.
-    fn poll(&mut self, passed: u16);
-
-    /// Returns whether it is set up.
-    fn is_ready(&self) -> bool;
-
-    /// Returns whether the last attempt to set it up has failed.
-    fn has_failed(&self) -> bool;
-
-    /// Returns whether it neither sends nor receives, as far as it shows that.
-    fn is_free(&mut self) -> bool;
-}
-
-impl<S, M, A> Peer for Lora<S, M, A>
-where
-    S: Read<u8> + Write<u8>,
-    M: OutputPin,
-    A: InputPin + OutputPin,
-{
-    const IS_RADIO: bool = true;
-
-    #[inline(always)]
-    fn poll(&mut self, passed: u16) {
-        self.poll(passed);
-    }
-
-    #[inline(always)]
-    fn is_ready(&self) -> bool {
-        self.is_ready()
-    }
-
-    #[inline(always)]
-    fn has_failed(&self) -> bool {
-        self.has_failed()
-    }
-
-    #[inline(always)]
-    fn is_free(&mut self) -> bool {
-        self.is_free()
-    }
-}
-
-/// An RS-232 socket: the UART alone.
-#[derive(Debug)]
-pub struct Rs232<S>(S);
-
-impl<S: ErrorType> ErrorType for Rs232<S> {
-    type Error = S::Error;
-}
-
-impl<S: Read<u8>> Read<u8> for Rs232<S> {
-    fn read(&mut self) -> nb::Result<u8, Self::Error> {
-        self.0.read()
-    }
-}
-
-impl<S: Write<u8>> Write<u8> for Rs232<S> {
-    fn write(&mut self, byte: u8) -> nb::Result<(), Self::Error> {
-        self.0.write(byte)
-    }
-
-    fn flush(&mut self) -> nb::Result<(), Self::Error> {
-        self.0.flush()
-    }
-}
-
-impl<S: Read<u8> + Write<u8>> Peer for Rs232<S> {
-    const IS_RADIO: bool = false;
-
-    fn poll(&mut self, _: u16) {}
-
-    fn is_ready(&self) -> bool {
-        true
-    }
-
-    fn has_failed(&self) -> bool {
-        false
-    }
-
-    fn is_free(&mut self) -> bool {
-        true
-    }
-}
+pub use peer::{Peer, Rs232};
 
 /// Times of a second line, in milliseconds.
 #[derive(Clone, Copy, Debug)]
@@ -396,6 +313,3 @@ impl<P: Peer> SecondLine<P> {
         *self.port.counters()
     }
 }
-
-#[cfg(test)]
-mod tests;
