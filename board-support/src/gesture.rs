@@ -63,6 +63,10 @@ impl Watch {
     /// Takes the level of the pin at `now` milliseconds after power-on. Call this every 10 ms or so. Returns whether the
     /// gesture has just ended.
     pub fn step(&mut self, now: u32, high: bool) -> bool {
+        if now > END_MS + 1_000 {
+            // For good, also when the milliseconds have wrapped.
+            self.moves = u8::MAX;
+        }
         if high != self.level || self.counted.is_none() && self.since == 0 {
             (self.level, self.since) = (high, now.max(1));
         }

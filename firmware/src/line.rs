@@ -137,11 +137,15 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
     #[inline]
     pub fn on_gap(&mut self, now_ms: u32) -> bool {
         self.is_pending = false;
-        match self.gap.take_event() {
+        let waits = match self.gap.take_event() {
             Silence::T15 => self.port.short_silence(now_ms),
             Silence::T35 => self.port.long_silence(now_ms),
             Silence::None => false,
+        };
+        if HAS_EVENTS && waits {
+            self.ended = None;
         }
+        waits
     }
 
     /// Returns whether the line's registers change: a reply is being sent, or the unit arbitrates.

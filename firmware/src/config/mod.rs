@@ -412,6 +412,8 @@ impl<const SLOTS: usize> Config<SLOTS> {
                 *started = unit;
             }
         }
+        // Without a save, which would find out.
+        self.waiting &= self.left != 0 || self.saved.needs_restart(&self.started());
         self.revision = self.revision.wrapping_add(1);
     }
 

@@ -72,7 +72,8 @@ impl<const SLOTS: usize> Events<SLOTS> {
         for (channel, before) in own.reported.into_iter().enumerate() {
             let smallest = match port.kind(channel) {
                 Kind::BitOutput => 1,
-                Kind::WordInput | Kind::WordOutput if words => port.deadband(channel),
+                Kind::WordOutput if words => 1,
+                Kind::WordInput if words => port.deadband(channel),
                 _ => continue,
             };
             // Also across 0, where a temperature changes its sign.
@@ -98,6 +99,10 @@ impl<const SLOTS: usize> Events<SLOTS> {
         };
         if kind_of(port, channel).is_none_or(|own| own as u8 != kind) {
             return false;
+        }
+        if !on {
+            self.edges
+                .retain(|edge| usize::from(edge & !LEVEL) != index);
         }
         let bit = 1 << channel;
         for (set, on) in [

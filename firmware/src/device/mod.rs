@@ -71,6 +71,12 @@ pub struct Device<const SLOTS: usize> {
     has_links: bool,
     /// Slots whose levels are those of a scan, one bit for each. From then on a change is an edge.
     linked: u8,
+    /// The same for the sources that are words: the settings have not changed since.
+    linked_words: u8,
+    /// Slots whose links have not run since the last scan.
+    links_due: u8,
+    /// A scan has read words since the settings have changed.
+    words_scanned: bool,
     events: Events<SLOTS>,
     /// A command from a request, to be executed when its reply has been sent.
     ordered: Option<Command>,
@@ -160,6 +166,9 @@ impl<const SLOTS: usize> Device<SLOTS> {
             levels: [0; SLOTS],
             has_links: false,
             linked: 0,
+            linked_words: 0,
+            links_due: 0,
+            words_scanned: false,
             events: Events::new(),
             ordered: None,
             new_unit: None,
@@ -224,6 +233,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
             self.edges.set_late(now);
         }
         let first = self.points.first_of(slot);
+        self.links_are_due(words);
         let Some(port) = self.points.ports_mut().get_mut(slot) else {
             return;
         };
@@ -328,7 +338,10 @@ impl<const SLOTS: usize> Device<SLOTS> {
             return Err(Exception::IllegalDataValue);
         };
         let allowed = match Order::of(command) {
-            Some(Order::Prepare) if self.config.saves_left() == 0 => false,
+            // A save that is under way takes one from the budget.
+            Some(Order::Prepare) if self.config.saves_left() <= self.config.has_save() as u8 => {
+                false
+            }
             Some(order) => update.check(order).is_ok(),
             None => true,
         };

@@ -8,11 +8,11 @@ use crate::Adu;
 /// The type of function 2B for device identification (V1.1b3 6.21).
 const IDENTIFICATION: u8 = 0x0E;
 
-/// Returns whether a frame has the length of a request with its function. `ahead`: number of bytes in front of the unit
-/// address.
+/// Returns the length of a request with the function of this frame, if the function determines it. `ahead`: number of bytes
+/// in front of the unit address.
 ///
 /// A request of function 08 may have any length. Here it has the usual one, with a single data word.
-pub(super) fn is_request(frame: &Adu, ahead: u8) -> bool {
+pub(super) fn of_request(frame: &Adu, ahead: u8) -> Option<usize> {
     let byte = |at| frame.get(ahead + at);
     let count = |at| usize::from(byte(at));
     let length = match byte(1) {
@@ -24,12 +24,17 @@ pub(super) fn is_request(frame: &Adu, ahead: u8) -> bool {
         0x17 => 13 + count(10),
         0x18 => 6,
         0x2B if byte(2) == IDENTIFICATION => 7,
-        _ => return false,
+        _ => return None,
     };
-    frame.len() == usize::from(ahead) + length
+    Some(usize::from(ahead) + length)
 }
 
-/// Returns whether a frame has the length of a reply with its function. `ahead` as for [`is_request`].
+/// Returns whether a frame has the length of a request with its function, as [`of_request`].
+pub(super) fn is_request(frame: &Adu, ahead: u8) -> bool {
+    of_request(frame, ahead) == Some(frame.len())
+}
+
+/// Returns whether a frame has the length of a reply with its function. `ahead` as for [`of_request`].
 ///
 /// Functions 05, 06, 08, 14, 15 and 16 are omitted: their replies have the lengths of their requests.
 pub(super) fn is_reply(frame: &Adu, ahead: u8) -> bool {

@@ -2,9 +2,9 @@
 
 use super::Receiver;
 use crate::counters::count;
-use crate::line::Units;
 use crate::line::messages::{Message, begins_reply};
 use crate::line::state::{FOLLOWS, PAUSED, QUIET, SEEKS, TORN};
+use crate::line::{Units, length};
 use crate::{crc, fast};
 
 impl<U: Units> Receiver<'_, U> {
@@ -44,11 +44,16 @@ impl<U: Units> Receiver<'_, U> {
     }
 
     /// Drops what is in front of the reply of Fast Modbus that the last three characters begin, if they do. While units
-    /// arbitrate, several start bits can overlap, so that these characters need not be FF.
+    /// arbitrate, several start bits can overlap, so that these characters need not be FF. A frame that begins as a request
+    /// for this unit stays whole up to its length, whatever is in it.
     pub(super) fn seek_reply(&mut self) {
         let Some(adu) = &mut self.filling else {
             return;
         };
+        let is_for_unit = self.units.contains(adu.get(0)) || adu.get(0) == 0;
+        if is_for_unit && length::of_request(adu, 0).is_some_and(|length| adu.len() <= length) {
+            return;
+        }
         let Some(at) = adu.len().checked_sub(3) else {
             return;
         };
