@@ -1,6 +1,6 @@
 //! Outputs from the reset to the first scan: off, then START, with no state in between, for every kind of reset.
 
-use register_map::configuration::START;
+use register_map::configuration::{AS_IT_WAS, START};
 use sim::{Module, Time};
 
 use crate::{
@@ -125,4 +125,13 @@ fn analog_outputs_go_from_the_stored_dac_values_directly_to_start() {
         bench.started();
         assert_eq!(bench.registers(SLOT, 4), Ok(start.to_vec()), "{what}");
     }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_modio_02_has_no_room_for_outputs_that_start_as_they_were() {
+    let mut bench = Bench::set_up(Module::Do4, &[]);
+    bench.unlock();
+    assert_eq!(bench.write(START + SLOT, &[AS_IT_WAS]), Err(3));
+    bench.write(START + SLOT, &[1]).unwrap();
 }
