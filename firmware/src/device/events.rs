@@ -101,8 +101,14 @@ impl<const SLOTS: usize> Events<SLOTS> {
             return false;
         }
         if !on {
-            self.edges
-                .retain(|edge| usize::from(edge & !LEVEL) != index);
+            // Edges of this point that wait are no longer reported.
+            for _ in 0..self.edges.len() {
+                if let Some(edge) = self.edges.pop_front()
+                    && usize::from(edge & !LEVEL) != index
+                {
+                    let _ = self.edges.push_back(edge);
+                }
+            }
         }
         let bit = 1 << channel;
         for (set, on) in [
