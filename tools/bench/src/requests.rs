@@ -24,6 +24,9 @@ const SHORT: u32 = 850;
 const SETTING: u32 = 1300;
 /// What a board that serves function 70 may take in addition: each frame may be a message of it.
 const FAST: u32 = 40;
+/// What a write of sixteen outputs may take in addition, because an output can start as it was: its command before SAFE is
+/// no longer kept.
+const KEPT: u32 = 80;
 /// What ASCII mode may take in addition.
 const ASCII: u32 = 50;
 
@@ -124,13 +127,13 @@ fn of_all_slots(board: &Board) -> Vec<Request> {
         ),
         request(
             "0F write multiple coils",
-            SIXTEEN,
+            SIXTEEN + KEPT,
             Module::Do4,
             with_data(0x0F, &read, &bits),
         ),
         request(
             "10 write multiple registers, outputs",
-            1900,
+            1900 + KEPT,
             Module::Ao4,
             with_data(0x10, &read, &words),
         ),
