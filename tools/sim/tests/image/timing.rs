@@ -82,7 +82,7 @@ fn driver_is_off_soon_after_the_reply_at_every_rate_and_format() {
             ];
             let mut bench = Bench::set_up(Module::Di4, &line);
             // At the highest rates the bench would not wait this long. Other work may delay a reply by more than LATE.
-            bench.patience = Time::from_us(100);
+            bench.patience = Time::from_us(200);
             let bit = bench.bit();
             let request = match mode {
                 0 => adu(&[1, 3, 1, 0, 0, 9]),
