@@ -14,8 +14,14 @@ use crate::{HAS_EVENTS, HAS_SLOTS};
 
 /// High byte of every configuration address. The low byte is the index in [`Settings`].
 const PAGE: u16 = KEY >> 8;
-/// Number of values in [`Settings`]. DEADBAND is behind those of the configuration.
-const VALUES: usize = if HAS_EVENTS { 256 + 32 } else { 256 };
+/// Index of the first DEADBAND, behind the values of the configuration.
+const DEADBANDS: usize = 256;
+/// Number of values in [`Settings`].
+const VALUES: usize = if HAS_EVENTS {
+    DEADBANDS + points::COUNT as usize
+} else {
+    DEADBANDS
+};
 
 /// Number of settings that need a restart.
 pub(super) const RESTARTS: usize = restarts();
@@ -258,7 +264,7 @@ impl<const SLOTS: usize> Settings<SLOTS> {
 #[inline]
 const fn place(address: u16) -> usize {
     if has_deadband(address) {
-        256 + (address - DEADBAND) as usize
+        DEADBANDS + (address - DEADBAND) as usize
     } else {
         (address & 0xFF) as usize
     }
@@ -361,7 +367,7 @@ impl Iterator for Addresses {
 pub struct Changed<'a, const SLOTS: usize> {
     settings: &'a Settings<SLOTS>,
     held: Addresses,
-    /// The register of a link that is next, after all others.
+    /// The register of a link, or of DEADBAND behind these, that is next after all others.
     links: u16,
 }
 

@@ -51,17 +51,21 @@ fn request_that_is_never_complete_is_answered_after_the_frame_gap() {
 #[test]
 fn request_has_ended_with_its_last_byte() {
     for (request, wait) in [(READ.to_vec(), 1), (echo(), GAP_MS + 1)] {
-        let mut bench = Bench::new();
-        bench.receive(&request);
-        let received_at = bench.now_ms + 1;
-        let served = (0..wait).any(|_| {
-            bench.now_ms += 1;
-            bench.line.poll(bench.now_ms, 1)
-        });
-        assert!(served);
-        let request = bench.line.take().expect("a request");
-        assert_eq!(request.ended(), received_at);
+        assert_ends_with_its_last_byte(Bench::new(), &request, wait);
     }
+}
+
+/// Asserts that a request is served within `wait` milliseconds, and has ended with its last byte.
+fn assert_ends_with_its_last_byte<P: super::Peer>(mut bench: Bench<P>, request: &[u8], wait: u16) {
+    bench.receive(request);
+    let received_at = bench.now_ms + 1;
+    let served = (0..wait).any(|_| {
+        bench.now_ms += 1;
+        bench.line.poll(bench.now_ms, 1)
+    });
+    assert!(served);
+    let request = bench.line.take().expect("a request");
+    assert_eq!(request.ended(), received_at);
 }
 
 /// Units 18 and 19 are asked in turn with this one, and no silence is as long as the frame gap.

@@ -35,16 +35,7 @@ fn complete_request_is_answered_after_t35() {
 
 #[test]
 fn request_has_ended_with_its_last_byte() {
-    let mut bench = Bench::rs232();
-    bench.receive(&READ);
-    let received_at = bench.now_ms + 1;
-    let served = (0..=GAP_MS).any(|_| {
-        bench.now_ms += 1;
-        bench.line.poll(bench.now_ms, 1)
-    });
-    assert!(served);
-    let request = bench.line.take().expect("a request");
-    assert_eq!(request.ended(), received_at);
+    super::assert_ends_with_its_last_byte(Bench::rs232(), &READ, GAP_MS + 1);
 }
 
 #[test]
