@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use modio_description::Description;
 use register_map::codes::{self, Command};
-use register_map::configuration::{BAUD, COMMAND, KEY, MODE, OPENING_KEY};
+use register_map::configuration::{BAUD, COMMAND, KEY, MODE, OPENING_KEY, UNIT};
 use register_map::state::{self, status};
 use tokio::time::{Instant, sleep};
 
@@ -52,25 +52,30 @@ impl Device {
         }
     }
 
-    /// Restarts the unit and waits until it answers. It may answer with the line settings that it had, because a restart
-    /// loses what is not saved, and because a gateway in front of it keeps its own; or with those that its registers
-    /// announce. Both are tried in turn. The lock must be open.
+    /// Restarts the unit and waits until it answers. It may answer with the address and the line settings that it had,
+    /// because a restart loses what is not saved, and because a gateway in front of it keeps its own; or with those that
+    /// its registers announce. Both are tried in turn. The lock must be open.
     pub async fn restart(mut self) -> Result<Self, Failure> {
         let line = self.read_words(BAUD, 3).await?;
-        let before = self.uptime().await?;
+        let unit = self.stored_unit().await?;
+        let before = Before {
+            uptime: self.uptime().await?,
+            unique_id: self.unique_id().await?,
+        };
         self.order(Command::Restart.code(), "restarting").await?;
         let (timeout, retries) = (self.master.endpoint().timeout, 0);
         let usual = self.master.be_patient(timeout, retries);
-        let had = self.master.endpoint().clone();
-        let announced = announced(&had, &line);
-        let lines: Vec<_> = std::iter::once(had.clone()).chain(announced).collect();
-        let answering = self.find_line(&lines, before).await?;
+        let mut had = self.master.endpoint().clone();
+        had.unit = self.unit;
+        let announced = announced(&had, &line, unit);
+        let lines: Vec<_> = std::iter::once(had).chain(announced).collect();
+        let answering = self.find_line(&lines, &before).await?;
         self.master.be_patient(usual.0, usual.1);
         if lines.len() > 1 {
-            let shown = shown(self.master.endpoint());
+            let shown = shown(&lines, answering);
             let text = if answering == 0 {
                 format!(
-                    "the unit still answers with {shown}: other values of BAUD, FORMAT and MODE were not saved, or are for another line"
+                    "the unit still answers with {shown}: other values of BAUD, FORMAT, MODE and UNIT were not saved, or are for another line"
                 )
             } else {
                 format!("the unit now answers with {shown}: use that in your next command")
@@ -80,9 +85,9 @@ impl Device {
         Ok(self)
     }
 
-    /// Waits for a unit that restarts. Asks with each of these settings in turn, and returns the index of those with
-    /// which the unit answers. `before` is the unit's uptime before the restart.
-    async fn find_line(&mut self, lines: &[Endpoint], before: u32) -> Result<usize, Failure> {
+    /// Waits for a unit that restarts. Asks with each of these addresses and settings in turn, and returns the index of
+    /// those with which the unit answers.
+    async fn find_line(&mut self, lines: &[Endpoint], before: &Before) -> Result<usize, Failure> {
         let ordered = Instant::now();
         let until = ordered + STARTING.max(self.master.endpoint().timeout * 4);
         // A unit that has not restarted yet would also answer.
@@ -97,24 +102,21 @@ impl Device {
                     last = failure;
                     continue;
                 }
-                match self.uptime().await {
-                    Ok(now) if now < before => return Ok(index),
-                    // A unit that was up for a moment before, and is asked slowly. The margin is for its clock.
-                    Ok(now) if u64::from(now) <= ordered.elapsed().as_secs() + 1 => {
-                        return Ok(index);
-                    }
-                    Ok(_) => sleep(PAUSE).await,
+                self.unit = line.unit;
+                match self.has_restarted(before, ordered).await {
+                    Ok(true) => return Ok(index),
+                    Ok(false) => sleep(PAUSE).await,
                     Err(failure @ (Failure::NoAnswer(_) | Failure::Garbled(_))) => last = failure,
                     Err(failure) => return Err(failure),
                 }
             }
         }
         Err(match lines {
-            [had, announced] => Failure::NoAnswer(format!(
+            [had, _] => Failure::NoAnswer(format!(
                 "unit {} does not answer after the restart, neither with the {} that it had nor with the {} that it announced: {}",
-                self.unit,
-                shown(had),
-                shown(announced),
+                had.unit,
+                shown(lines, 0),
+                shown(lines, 1),
                 if self.is_serial() {
                     "`modioctl --timeout 0.2s scan --rates all --formats all` looks for it"
                 } else {
@@ -151,54 +153,101 @@ impl Device {
         Ok(words.iter().any(|word| word & status::RESTART_NEEDED != 0))
     }
 
+    /// Returns whether the unit that answers now is the one of before, and has restarted since the order.
+    async fn has_restarted(&mut self, before: &Before, ordered: Instant) -> Result<bool, Failure> {
+        let now = self.uptime().await?;
+        // A unit that was up for a moment before, and is asked slowly, can have a higher uptime. The margin is for its
+        // clock.
+        let is_new = now < before.uptime || u64::from(now) <= ordered.elapsed().as_secs() + 1;
+        // Another unit can have the new address already.
+        Ok(is_new && self.unique_id().await? == before.unique_id)
+    }
+
     async fn uptime(&mut self) -> Result<u32, Failure> {
         let words = self.read_words(state::UPTIME, 2).await?;
         Ok(long(&words))
     }
+
+    async fn unique_id(&mut self) -> Result<Vec<u16>, Failure> {
+        self.read_words(state::UNIQUE_ID, 6).await
+    }
+
+    /// Returns the value of UNIT, or `None` for a unit with an address switch.
+    async fn stored_unit(&mut self) -> Result<Option<u8>, Failure> {
+        match self.read_words(UNIT, 1).await {
+            Ok(words) => {
+                let unit = words.first().and_then(|unit| u8::try_from(*unit).ok());
+                Ok(unit.filter(|unit| (1..=247).contains(unit)))
+            }
+            Err(Failure::Refused(_)) => Ok(None),
+            Err(failure) => Err(failure),
+        }
+    }
 }
 
-/// Returns the endpoint for a unit that announces these values of BAUD, FORMAT and MODE, if they make a difference.
-/// Values without a meaning change nothing.
-fn announced(now: &Endpoint, line: &[u16]) -> Option<Endpoint> {
-    let [baud, format, mode] = line else {
-        return None;
-    };
-    if now.framing == Framing::Mbap {
+/// What is known of a unit before its restart.
+struct Before {
+    uptime: u32,
+    unique_id: Vec<u16>,
+}
+
+/// Returns the endpoint for a unit that announces these values of BAUD, FORMAT and MODE, and of UNIT if it has no switch,
+/// if they make a difference. Values without a meaning change nothing.
+fn announced(now: &Endpoint, line: &[u16], unit: Option<u8>) -> Option<Endpoint> {
+    // In recovery mode the unit always uses the factory's line settings.
+    if now.unit == 255 {
         return None;
     }
     let mut then = now.clone();
-    then.framing = match codes::Mode::from_code(*mode) {
-        Some(codes::Mode::Ascii) => Framing::Ascii,
-        Some(codes::Mode::Rtu) => Framing::Rtu,
-        None => now.framing,
-    };
-    // A gateway has its own rate and format.
-    if now.place.is_serial() {
-        let baud = u32::from(*baud) * 100;
-        if RATES.contains(&baud) {
-            then.baud = baud;
-        }
-        let format = codes::Format::from_code(*format);
-        let format = format.and_then(|format| format.name().parse().ok());
-        then.format = format.unwrap_or(now.format);
+    then.unit = unit.unwrap_or(now.unit);
+    if let [baud, format, mode] = line
+        && now.framing != Framing::Mbap
+    {
+        change_line(&mut then, *baud, *format, *mode);
     }
-    // In recovery mode the unit always uses the factory's line settings.
-    let same = (then.baud, then.format, then.framing) == (now.baud, now.format, now.framing);
-    (!same && now.unit != 255).then_some(then)
+    let all = |of: &Endpoint| (of.unit, of.baud, of.format, of.framing);
+    (all(&then) != all(now)).then_some(then)
 }
 
-/// Describes rate, format and framing for people. Only the framing matters to a gateway.
-fn shown(endpoint: &Endpoint) -> String {
-    let mode = if endpoint.framing == Framing::Ascii {
-        "ASCII"
-    } else {
-        "RTU"
-    };
-    if endpoint.place.is_serial() {
-        format!("{} bit/s {} {mode}", endpoint.baud, endpoint.format)
-    } else {
-        mode.to_owned()
+/// Changes an endpoint to these values of BAUD, FORMAT and MODE. Values without a meaning change nothing.
+fn change_line(endpoint: &mut Endpoint, baud: u16, format: u16, mode: u16) {
+    match codes::Mode::from_code(mode) {
+        Some(codes::Mode::Ascii) => endpoint.framing = Framing::Ascii,
+        Some(codes::Mode::Rtu) => endpoint.framing = Framing::Rtu,
+        None => {}
     }
+    // A gateway has its own rate and format.
+    if endpoint.place.is_serial() {
+        let baud = u32::from(baud) * 100;
+        if RATES.contains(&baud) {
+            endpoint.baud = baud;
+        }
+        let format = codes::Format::from_code(format);
+        if let Some(format) = format.and_then(|format| format.name().parse().ok()) {
+            endpoint.format = format;
+        }
+    }
+}
+
+/// Describes rate, format and framing of one of these endpoints for people, and the address if they differ in it. Only
+/// the framing matters to a gateway.
+fn shown(all: &[Endpoint], index: usize) -> String {
+    let Some(endpoint) = all.get(index) else {
+        return String::new();
+    };
+    let mut parts = Vec::new();
+    if all.iter().any(|other| other.unit != endpoint.unit) {
+        parts.push(format!("address {},", endpoint.unit));
+    }
+    if endpoint.place.is_serial() {
+        parts.push(format!("{} bit/s {}", endpoint.baud, endpoint.format));
+    }
+    parts.push(match endpoint.framing {
+        Framing::Ascii => "ASCII".to_owned(),
+        Framing::Rtu => "RTU".to_owned(),
+        Framing::Mbap => "Modbus TCP".to_owned(),
+    });
+    parts.join(" ")
 }
 
 /// Returns the description with these modules in its slots, to which the settings by point belong.
@@ -223,12 +272,21 @@ mod tests {
     fn values_without_a_meaning_do_not_change_the_line() {
         let serial = Endpoint::new(Place::Serial("COM3".to_owned()), Framing::Rtu);
         let tcp = Endpoint::new(Place::Tcp("a:1".to_owned()), Framing::Rtu);
-        let line = |now, words: [u16; 3]| announced(now, &words).map(|then| shown(&then));
-        assert_eq!(line(&serial, [96, 0, 0]), None);
-        assert_eq!(line(&serial, [0, 99, 99]), None);
-        let other = "19200 bit/s 7E1 ASCII".to_owned();
-        assert_eq!(line(&serial, [192, 4, 1]), Some(other));
-        assert_eq!(line(&tcp, [192, 1, 0]), None);
-        assert_eq!(line(&tcp, [0, 4, 1]), Some("ASCII".to_owned()));
+        let line = |now: &Endpoint, words: [u16; 3], unit| {
+            let both = [now.clone(), announced(now, &words, unit)?];
+            Some(shown(&both, 1))
+        };
+        assert_eq!(line(&serial, [96, 0, 0], None), None);
+        assert_eq!(line(&serial, [0, 99, 99], Some(1)), None);
+        let other = |text: &str| Some(text.to_owned());
+        let ascii = other("19200 bit/s 7E1 ASCII");
+        assert_eq!(line(&serial, [192, 4, 1], None), ascii);
+        assert_eq!(line(&tcp, [192, 1, 0], None), None);
+        assert_eq!(line(&tcp, [0, 4, 1], None), other("ASCII"));
+        let both = other("address 17, 9600 bit/s 8N2 RTU");
+        assert_eq!(line(&serial, [96, 0, 0], Some(17)), both);
+        let gateway = Endpoint::new(Place::ModbusTcp("a:1".to_owned()), Framing::Mbap);
+        let address = other("address 17, Modbus TCP");
+        assert_eq!(line(&gateway, [96, 0, 1], Some(17)), address);
     }
 }

@@ -5,11 +5,11 @@ use std::net::SocketAddr;
 use std::sync::{Arc, Mutex};
 
 use modioctl::bus::adu::Framing;
-use register_map::configuration::{BAUD, COMMAND, KEY, MODE};
-use register_map::state::UPTIME;
+use register_map::configuration::{BAUD, COMMAND, KEY, MODE, UNIT};
+use register_map::state::{UNIQUE_ID, UPTIME};
 
 use crate::program::At;
-use crate::served::{answer, serve, server};
+use crate::served::{answer, response, serve, serve_requests, server};
 use crate::unit::Unit;
 
 /// What a restart does.
@@ -65,6 +65,40 @@ fn a_restart_is_followed_by_the_settings_with_which_the_unit_answers() {
     let text = lost.failed(3);
     let both = "neither with the RTU that it had nor with the ASCII that it announced";
     assert!(text.contains(both) && text.contains("gateway"), "{text}");
+}
+
+/// A unit over TCP with address 1, which misses one request while it restarts. Its UNIT announces 17. If that is not
+/// saved, another unit, which has just started, has address 17.
+fn moving_unit(is_saved: bool) -> SocketAddr {
+    let mut unit = server([(UPTIME + 1, 1000), (UNIT, 17), (UNIQUE_ID, 0xA)]);
+    let mut other = server([(UNIQUE_ID, 0xB)]);
+    let mut own = 1;
+    let mut is_starting = false;
+    serve_requests(move |address, pdu| {
+        let server = match address {
+            17 if !is_saved => &mut other,
+            _ if address == own && !std::mem::take(&mut is_starting) => &mut unit,
+            _ => return Some(Vec::new()),
+        };
+        if pdu[0] == 6 && pdu[1..3] == COMMAND.to_be_bytes() {
+            server.device.words[usize::from(UPTIME) + 1] = 0;
+            own = if is_saved { 17 } else { 1 };
+            is_starting = true;
+        }
+        Some(response(server, address, pdu))
+    })
+}
+
+#[test]
+fn a_unit_is_found_at_the_address_that_it_has_after_a_restart() {
+    for (is_saved, wanted) in [
+        (true, "now answers with address 17, RTU"),
+        (false, "still answers with address 1, RTU"),
+    ] {
+        let at = At::tcp(moving_unit(is_saved));
+        let text = at.run("--timeout 200ms reboot").fine();
+        assert!(text.contains(wanted), "{text}");
+    }
 }
 
 #[test]
