@@ -100,10 +100,11 @@ impl Persistence {
     #[inline(never)]
     fn record(&mut self, device: &mut impl Mutex<T = &'static mut Device>) {
         let outputs = device.lock(|device| device.outputs());
-        let saving = if outputs.is_empty() || !self.pages.has_supply() {
-            None
-        } else {
+        // Also without outputs: values that are stored from before would return when START is set again.
+        let saving = if self.pages.has_supply() {
             Saving::of_outputs(&self.store, &self.pages, &outputs)
+        } else {
+            None
         };
         if saving.is_some() {
             self.schedule.take();

@@ -118,6 +118,28 @@ fn without_outputs_that_start_as_they_were_nothing_is_written() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
+fn values_from_before_start_was_changed_do_not_return() {
+    let mut bench = keeping(&[]);
+    let starts = |bench: &mut Bench, start| {
+        bench.configure(START, &[start; 4]);
+        bench.configure(START + ANALOG, &[start; 2]);
+        bench.save();
+    };
+    bench.write_bits(0, &[true; 4]).unwrap();
+    bench.write(ANALOG, &[1234, 4095]).unwrap();
+    bench.board.run_for(STORED);
+    starts(&mut bench, 0);
+    bench.board.run_for(STORED);
+    bench.power_cycle();
+    bench.board.run_for(STORED);
+    starts(&mut bench, AS_IT_WAS);
+    bench.power_cycle();
+    assert_eq!(outputs(&bench, 1), [false; 4]);
+    assert_eq!(bench.registers(ANALOG, 2), Ok(vec![0; 2]));
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
 fn power_cut_in_any_operation_of_a_record_keeps_settings_and_leaves_old_or_new_outputs() {
     let mut bench = keeping(&[(BAUD, 1152)]);
     bench.settings(Settings {
