@@ -42,6 +42,9 @@ use plan::{Horizon, Plan};
 /// Longest time between two updates of the bus itself.
 const RECORDED: Time = Time::from_ms(10);
 
+/// Time that an edge takes for a metre of cable, at two thirds of the speed of light.
+const METRE: Time = Time::from_ns(5);
+
 /// Boards on one RS-485 line.
 ///
 /// A bus with one board uses the line of that board. With several boards, [`Bus::line`] is the bus: the master is
@@ -52,6 +55,8 @@ pub struct Bus {
     boards: Vec<Board>,
     /// The next actions of each board.
     plans: Vec<Plan>,
+    /// For each board, the time that an edge takes from the master to it.
+    delays: Vec<Time>,
     /// For each board, whether [`board_mut`](Self::board_mut) has returned it since the last run.
     lent: Vec<bool>,
     /// The bus itself; not used with one board.
@@ -81,6 +86,7 @@ impl Bus {
         }
         Self {
             plans: boards.iter().map(Board::plan).collect(),
+            delays: vec![Time::ZERO; boards.len()],
             lent: vec![true; boards.len()],
             boards,
             line: Line::of_bus(now),
@@ -122,6 +128,16 @@ impl Bus {
     pub fn board_mut(&mut self, n: usize) -> &mut Board {
         self.lent[n] = true;
         &mut self.boards[n]
+    }
+
+    /// Places board `n` at this distance from the master, in metres of cable, before the first run. Without this, all
+    /// boards are at the master. Not used with one board.
+    ///
+    /// # Panics
+    ///
+    /// If there is no board `n`.
+    pub fn set_distance(&mut self, n: usize, metres: u32) {
+        self.delays[n] = METRE * metres.into();
     }
 
     /// Returns the virtual time of the board that is farthest ahead.
@@ -199,9 +215,9 @@ impl Bus {
         }
         if self.version != self.line.version() {
             self.version = self.line.version();
-            for board in &mut self.boards {
+            for (board, delay) in self.boards.iter_mut().zip(&self.delays) {
                 let from = self.line.now();
-                board.end_of_line(|end| end.mirror(&self.line, from));
+                board.end_of_line(|end| end.mirror(&self.line, from, *delay));
             }
             self.plans = self.boards.iter().map(Board::plan).collect();
         }
@@ -252,10 +268,13 @@ impl Bus {
         let Some(output) = self.boards[n].take_output() else {
             return;
         };
-        self.line.add_output(n, &output);
+        let from = self.delays[n];
+        self.line.add_output(n, &output, from);
         for (other, board) in self.boards.iter_mut().enumerate() {
             if other != n {
-                board.end_of_line(|end| end.add_output(n, &output));
+                let to = self.delays[other];
+                let delay = from.max(to) - from.min(to);
+                board.end_of_line(|end| end.add_output(n, &output, delay));
                 self.plans[other] = board.plan();
             }
         }

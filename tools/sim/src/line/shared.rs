@@ -174,21 +174,25 @@ impl Line {
         })
     }
 
-    /// Adds the output of unit `unit`, which is at another end.
-    pub(crate) fn add_output(&mut self, unit: usize, output: &Output) {
+    /// Adds the output of unit `unit`, which is at another end. It takes `delay` from there to here.
+    pub(crate) fn add_output(&mut self, unit: usize, output: &Output, delay: Time) {
         let records = self.shared.is_bus();
         let sender = self.shared.sender(unit);
-        sender.wave.truncate(output.from);
-        sender.wave.push(output.from, output.level);
-        for &(at, level) in &output.edges {
+        let from = output.from + delay;
+        let edges = || output.edges.iter().map(|&(at, level)| (at + delay, level));
+        sender.wave.truncate(from);
+        sender.wave.push(from, output.level);
+        for (at, level) in edges() {
             sender.wave.push(at, level);
         }
         if records {
-            sender.switches.extend(&output.switches);
+            let switches = output.switches.iter();
+            sender
+                .switches
+                .extend(switches.map(|&(at, on)| (at + delay, on)));
         }
         // Late edges, which are in the past of this end.
-        let edges = output.edges.iter().map(|&(at, _)| at);
-        for at in core::iter::once(output.from).chain(edges) {
+        for at in core::iter::once(from).chain(edges().map(|(at, _)| at)) {
             if at >= self.now {
                 break;
             }
@@ -207,17 +211,17 @@ impl Line {
         at > forgotten && last.is_none_or(|last| last < at)
     }
 
-    /// Takes over the levels of the master and the noise of `bus`, from `from` on.
-    pub(crate) fn mirror(&mut self, bus: &Self, from: Time) {
+    /// Takes over the levels of the master and the noise of `bus`, from `from` on. They take `delay` to this end.
+    pub(crate) fn mirror(&mut self, bus: &Self, from: Time, delay: Time) {
         let waves = [
             (&mut self.master.wave, &bus.master.wave),
             (&mut self.noise, &bus.noise),
         ];
         for (mine, theirs) in waves {
-            mine.truncate(from);
-            mine.push(from, theirs.level_at(from));
+            mine.truncate(from + delay);
+            mine.push(from + delay, theirs.level_at(from));
             for (at, level) in theirs.edges(from, Time::MAX) {
-                mine.push(at, level);
+                mine.push(at + delay, level);
             }
         }
     }

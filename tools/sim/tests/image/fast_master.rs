@@ -13,9 +13,13 @@ pub struct Master {
 }
 
 impl Master {
-    /// Returns a bus with these boards, which have these settings of the line, with time to start.
+    /// Returns a bus with these boards, which have these settings of the line, with time to start. Every other board is
+    /// at the far end of 1,200 m of cable.
     pub fn new(baud: Baud, format_code: u16, boards: Vec<Board>) -> Self {
         let mut bus = Bus::new(boards);
+        for n in (1..bus.len()).step_by(2) {
+            bus.set_distance(n, 1200);
+        }
         let settings = Settings {
             baud: baud.bits_per_second(),
             format: format(format_code),

@@ -16,7 +16,7 @@ fn received(byte: u8, late: Time) -> [Vec<(Time, u8)>; 2] {
     sender.run_to(begin);
     let output = sender.line.take_output().expect("a character");
     listener.run_to(begin + late);
-    listener.line.add_output(0, &output);
+    listener.line.add_output(0, &output, Time::ZERO);
     let end = Time::from_ms(2);
     let mut bytes = Vec::new();
     while let Some(at) = listener.usart.next_exchange(&listener.line) {
@@ -28,7 +28,7 @@ fn received(byte: u8, late: Time) -> [Vec<(Time, u8)>; 2] {
             bytes.push((at, listener.read(DR) as u8));
         }
     }
-    bus.add_output(0, &output);
+    bus.add_output(0, &output, Time::ZERO);
     bus.pass(end, None);
     let master = bus.take_received();
     assert!(master.iter().all(Received::is_good));
@@ -53,6 +53,24 @@ fn character_that_is_half_a_bit_late_is_received_at_its_true_time() {
 }
 
 #[test]
+fn character_arrives_later_at_the_end_of_a_long_cable() {
+    let (mut sender, mut listener) = (Bench::new(), Bench::new());
+    for end in [&mut sender.line, &mut listener.line] {
+        end.become_end();
+    }
+    sender.driver(true);
+    sender.write(DR, 0x55);
+    let begin = sender.now;
+    sender.run_to(begin);
+    let output = sender.line.take_output().expect("a character");
+    let delay = Time::from_us(6);
+    listener.line.add_output(0, &output, delay);
+    // Its start bit.
+    assert_eq!(listener.line.next_edge(), Some(TICK + delay));
+    assert_eq!(listener.receive(Time::from_ms(2)), [0x55]);
+}
+
+#[test]
 fn character_cut_by_the_driver_is_also_cut_at_the_other_end() {
     let (mut sender, mut listener) = (Bench::new(), Bench::new());
     sender.line.become_end();
@@ -61,7 +79,7 @@ fn character_cut_by_the_driver_is_also_cut_at_the_other_end() {
     sender.write(DR, 0x00);
     sender.run_to(TICK);
     let output = sender.line.take_output().expect("a character");
-    listener.line.add_output(0, &output);
+    listener.line.add_output(0, &output, Time::ZERO);
     assert!(sender.line.take_output().is_none());
     // After the start bit and three and a half data bits.
     let cut = TICK + Time::cycles(625 * 9 / 2, HZ);
@@ -70,7 +88,7 @@ fn character_cut_by_the_driver_is_also_cut_at_the_other_end() {
     // The listener is already past this instant, by an instruction.
     listener.run_to(cut + Time::from_ns(100));
     let output = sender.line.take_output().expect("the driver's switching");
-    listener.line.add_output(0, &output);
+    listener.line.add_output(0, &output, Time::ZERO);
     assert_eq!(listener.receive(Time::from_ms(2)), [0xF8]);
 }
 
@@ -88,7 +106,8 @@ fn two_units_at_the_same_time_collide_and_the_master_receives_the_wired_and() {
         bench.write(DR, byte);
         bench.run_to(TICK + Time::cycles(11 * 625, HZ));
         bench.driver(false);
-        bus.add_output(n, &bench.line.take_output().expect("a character"));
+        let output = bench.line.take_output().expect("a character");
+        bus.add_output(n, &output, Time::ZERO);
     }
     bus.pass(Time::from_ms(3), None);
     let received = bus.take_received();
