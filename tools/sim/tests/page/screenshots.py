@@ -24,7 +24,7 @@ EXACT = ["--exact-line", "127.0.0.1:0"]
 ENDPOINTS = {"pty": "/dev/pts/3", "tcp": "127.0.0.1:5020", "http": "http://127.0.0.1:8502/"}
 
 
-# Function 70 of unit 2: switches on the events of p1.1 to p1.4 and p2.3, and off the one that the unit has started.
+# Function 70 of unit 2: switches on the events of p1.1 to p1.4 and p2.3, and switches off the event of its start.
 EVENTS_ON = "02461812 020000 04 01010101 010006 01 01 0f0000 01 00"
 # The second of each fetch of events, the level of p1.2 from then on, and unit and flag of the packet that is confirmed.
 FETCHES = {6: (False, "0000"), 15: (True, "0200"), 31: (False, "0201"), 48: (True, "0200")}

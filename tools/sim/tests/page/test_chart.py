@@ -6,7 +6,7 @@ from browser import OnPage
 from playwright.sync_api import expect
 from simulator import crc
 
-# Function 70 switches on the events of p1.1 and p2.1, and off the one that the unit has started.
+# Function 70 switches on the events of p1.1 and p2.1, and switches off the event of its start.
 SWITCH_ON = "46180f 020000 01 01 010004 01 01 0f0000 01 00"
 
 
