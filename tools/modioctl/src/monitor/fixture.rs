@@ -38,6 +38,7 @@ pub fn polled(at: Instant, values: &[u16]) -> Polled {
         words,
         refused: Vec::new(),
         waiting: [].into(),
+        edges: None,
     }
 }
 

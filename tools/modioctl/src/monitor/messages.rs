@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use tokio::time::Instant;
 
+use super::edges::Edge;
 use super::plan::Words;
 use crate::bus::Seen;
 use crate::failure::Failure;
@@ -34,6 +35,8 @@ pub struct Polled {
     pub refused: Vec<(u8, String)>,
     /// Ports whose analog values have no known meaning until the unit restarts.
     pub waiting: BTreeSet<u8>,
+    /// The newest edges of digital inputs, newest first; `None` when they were not read.
+    pub edges: Option<Vec<Edge>>,
 }
 
 /// Message from the polling task.

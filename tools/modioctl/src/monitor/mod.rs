@@ -5,6 +5,7 @@
 //! draws it.
 
 pub mod draw;
+pub mod edges;
 pub mod editor;
 #[cfg(test)]
 mod fixture;
@@ -28,6 +29,8 @@ pub mod screen;
 pub mod tree;
 
 use std::io::{IsTerminal, stderr, stdout};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use ratatui::layout::Rect;
@@ -98,7 +101,15 @@ pub async fn run(
         Instant::now(),
     );
     let (mut screen, mut events) = Screen::open()?;
-    let poller = Poller::new(device, options.every, observers, updates, writes);
+    let wants_edges = Arc::new(AtomicBool::new(false));
+    let poller = Poller::new(
+        device,
+        options.every,
+        observers,
+        updates,
+        writes,
+        Arc::clone(&wants_edges),
+    );
     let mut poller = tokio::spawn(poller.run());
     let mut ended = std::pin::pin!(ended());
     let mut frames = interval(FRAME);
@@ -142,6 +153,7 @@ pub async fn run(
                 "a part of the monitor has panicked, as shown above",
             ));
         }
+        wants_edges.store(model.shows_edges(), Ordering::Relaxed);
         // Handle waiting events before the next drawing.
         if dirty && events.is_empty() {
             let drawn = screen.terminal.draw(|frame| {

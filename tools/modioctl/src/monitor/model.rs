@@ -6,12 +6,13 @@ use std::time::Duration;
 use modio_description::Description;
 use tokio::time::Instant;
 
+use super::edges::Edge;
 use super::editor::Editor;
 use super::frames::Frames;
 use super::history::History;
 use super::link::Link;
 use super::messages::{Polled, Update, Write};
-use super::plan::is_analog;
+use super::plan::{is_analog, is_digital_input};
 use super::tree::{Row, Tree};
 use crate::failure::Failure;
 use crate::names::{Book, Item};
@@ -104,6 +105,7 @@ pub struct Model {
     histories: BTreeMap<String, History>,
     refused: BTreeMap<u8, String>,
     waiting: BTreeSet<u8>,
+    edges: Vec<Edge>,
 }
 
 impl Model {
@@ -130,6 +132,7 @@ impl Model {
             histories: BTreeMap::new(),
             refused: BTreeMap::new(),
             waiting: BTreeSet::new(),
+            edges: Vec::new(),
         }
     }
 
@@ -198,6 +201,9 @@ impl Model {
         self.took = polled.took;
         self.refused = polled.refused.into_iter().collect();
         self.waiting = polled.waiting;
+        if let Some(edges) = polled.edges {
+            self.take_edges(edges);
+        }
         for (name, words) in polled.words {
             self.values.insert(name, Stamped { words, at });
         }
@@ -218,6 +224,14 @@ impl Model {
         }
         self.pending
             .retain(|_, pending| pending.confirmed.is_none_or(|confirmed| at < confirmed));
+    }
+
+    /// Replaces the edges. One that is known keeps its time of day, which would otherwise change a little each time.
+    fn take_edges(&mut self, edges: Vec<Edge>) {
+        let known = std::mem::take(&mut self.edges);
+        let same = |edge: &Edge| known.iter().find(|known| known.is_same(edge)).cloned();
+        let edges = edges.into_iter().map(|edge| same(&edge).unwrap_or(edge));
+        self.edges = edges.collect();
     }
 
     fn wrote(&mut self, write: Write, result: Result<(), Failure>, now: Instant) {
@@ -292,6 +306,16 @@ impl Model {
     /// Returns whether a port waits for a restart, so that its analog values have no known meaning.
     pub fn waits(&self, port: u8) -> bool {
         self.waiting.contains(&port)
+    }
+
+    /// Returns whether the edges of the selected point are shown.
+    pub fn shows_edges(&self) -> bool {
+        self.page == Page::Points && self.point().is_some_and(is_digital_input)
+    }
+
+    /// Iterates over the last edges of a digital input, newest first.
+    pub fn edges(&self, point: u16) -> impl Iterator<Item = &Edge> {
+        self.edges.iter().filter(move |edge| edge.point == point)
     }
 
     /// Returns the point that is selected.

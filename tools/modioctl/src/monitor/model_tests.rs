@@ -2,14 +2,16 @@
 
 use std::time::Duration;
 
+use chrono::{Local, TimeDelta};
 use register_map::Module;
 use register_map::board::MODIO_02;
 use tokio::time::Instant;
 
+use super::edges::Edge;
 use super::fixture::{model, polled, show};
 use super::link::State;
 use super::messages::{Update, Write};
-use super::model::Model;
+use super::model::{Model, Page};
 use crate::failure::Failure;
 use crate::names::book;
 
@@ -192,4 +194,37 @@ fn slider_orders_its_value_and_stays_open_when_it_does_not_fit() {
         (&write.words[..], model.editor.is_none()),
         (&[12_000][..], true)
     );
+}
+
+#[test]
+fn edges_are_read_only_while_a_digital_input_is_selected_on_the_page_of_points() {
+    let now = Instant::now();
+    let mut inputs = model(Module::Di4, now);
+    inputs.tree.select(1);
+    assert!(inputs.shows_edges());
+    inputs.page = Page::Line;
+    assert!(!inputs.shows_edges());
+    inputs.page = Page::Points;
+    inputs.tree.select(0);
+    assert!(!inputs.shows_edges(), "a port");
+    for module in [Module::Do4, Module::Ai4] {
+        let mut others = model(module, now);
+        others.tree.select(1);
+        assert!(!others.shows_edges(), "{module:?}");
+    }
+}
+
+#[test]
+fn edge_that_is_read_again_keeps_its_time_of_day() {
+    let now = Instant::now();
+    let mut model = model(Module::Di4, now);
+    let first = Local::now();
+    for late in [0, 20] {
+        let mut round = polled(now, &[0; 4]);
+        let read_at = first + TimeDelta::milliseconds(late);
+        round.edges = Some(Edge::all(&[0x01, 0x10, 0, 0, 0, 1], 1, read_at));
+        model.update(Update::Polled(round), now);
+    }
+    let times: Vec<_> = model.edges(0x10).map(|edge| edge.at).collect();
+    assert_eq!(times, [first]);
 }

@@ -35,6 +35,8 @@ pub struct Plan {
     pub counters: Vec<Item>,
     /// Links of the outputs, read with the counters.
     pub links: Vec<Item>,
+    /// Uptime in ms, read with the log of edges; `None` for a unit without the log.
+    pub uptime_ms: Option<Item>,
 }
 
 impl Plan {
@@ -63,6 +65,7 @@ impl Plan {
         Self {
             counters: counters.collect(),
             links: links::all(book).unwrap_or_default(),
+            uptime_ms: found("uptime ms"),
             ports,
             state,
             settings,
@@ -124,6 +127,11 @@ impl Plan {
         let module = words.get(&format!("p{}.module", port.number));
         module.is_some_and(|module| module.first() != Some(&port.code))
     }
+}
+
+/// Returns whether an item is a digital input.
+pub const fn is_digital_input(item: &Item) -> bool {
+    matches!(item.meaning, Meaning::Bit) && !item.writable
 }
 
 /// Returns whether an item is an analog point.

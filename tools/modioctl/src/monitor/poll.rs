@@ -1,11 +1,16 @@
 //! The polling task. Only this task uses the line, and the display never waits for it.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use chrono::Local;
+use register_map::edges::log;
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender};
 use tokio::time::{Instant, sleep_until};
 
+use super::edges::{self, Edge};
 use super::messages::{Polled, Update, Write};
 use super::model::SELDOM;
 use super::plan::{Plan, Words, is_analog};
@@ -36,6 +41,8 @@ pub struct Poller {
     observers: Observers,
     updates: UnboundedSender<Update>,
     writes: UnboundedReceiver<Write>,
+    /// Whether the display shows the edges of an input.
+    wants_edges: Arc<AtomicBool>,
     device: Option<Device>,
     plan: Option<Plan>,
     /// Ports that wait for a restart, since the last restart that was detected.
@@ -43,6 +50,8 @@ pub struct Poller {
     /// Uptime of the unit in seconds, and the time when it was read.
     uptime: Option<(u64, Instant)>,
     counted: Option<Instant>,
+    /// Time when the log of edges was read, since the display shows edges.
+    logged: Option<Instant>,
     answered: Instant,
 }
 
@@ -62,6 +71,7 @@ impl Poller {
         observers: Observers,
         updates: UnboundedSender<Update>,
         writes: UnboundedReceiver<Write>,
+        wants_edges: Arc<AtomicBool>,
     ) -> Self {
         Self {
             endpoint: device.master.endpoint().clone(),
@@ -69,11 +79,13 @@ impl Poller {
             observers,
             updates,
             writes,
+            wants_edges,
             device: Some(device),
             plan: None,
             waiting: BTreeSet::new(),
             uptime: None,
             counted: None,
+            logged: None,
             answered: Instant::now(),
         }
     }
@@ -176,13 +188,43 @@ impl Poller {
             read(device, &plan.links_without(&self.waiting), &mut words).await?;
             self.counted = Some(Instant::now());
         }
+        let edges = self.edges(plan).await?;
         Ok(Round::Complete(Box::new(Polled {
             at,
             took,
             words,
             refused,
             waiting: self.waiting.clone(),
+            edges,
         })))
+    }
+
+    /// Reads the log of edges, if the display shows them and it is time for it. Returns the newest edges.
+    async fn edges(&mut self, plan: &Plan) -> Result<Option<Vec<Edge>>, Failure> {
+        if !self.wants_edges.load(Ordering::Relaxed) {
+            self.logged = None;
+        }
+        let is_due = self.wants_edges.load(Ordering::Relaxed)
+            && self.logged.is_none_or(|logged| logged.elapsed() >= SELDOM)
+            && self.writes.is_empty();
+        let (true, Some(uptime), Some(device)) = (is_due, &plan.uptime_ms, &mut self.device) else {
+            return Ok(None);
+        };
+        self.logged = Some(Instant::now());
+        let records = device.read_records(log::FILE, edges::FIRST, edges::COUNT);
+        let records = match records.await {
+            Err(Failure::Refused(_)) => {
+                // The unit has no log. Do not ask for it again.
+                if let Some(plan) = &mut self.plan {
+                    plan.uptime_ms = None;
+                }
+                return Ok(None);
+            }
+            records => records?,
+        };
+        // The uptime is read last, so that no edge is newer.
+        let uptime = device.read_words(uptime.address, uptime.words).await?;
+        Ok(Some(Edge::all(&records, long(&uptime), Local::now())))
     }
 
     /// Detects a restart from the uptime. A port that waited for a restart no longer waits then.

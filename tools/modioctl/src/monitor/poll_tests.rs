@@ -1,5 +1,6 @@
 //! Tests of the polling task.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use register_map::Module;
@@ -44,7 +45,8 @@ fn order(age: Duration) -> (String, Vec<u8>) {
         };
         orders.send(write).unwrap();
         let observers = Box::new(|| -> crate::bus::Observer { Box::new(|_| {}) });
-        let poller = Poller::new(device, EVERY, observers, updates, writes);
+        let wants_edges = Arc::default();
+        let poller = Poller::new(device, EVERY, observers, updates, writes, wants_edges);
         let task = tokio::spawn(poller.run());
         let failure = loop {
             if let Some(Update::Wrote(_, result)) = news.recv().await {

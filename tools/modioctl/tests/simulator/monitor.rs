@@ -5,8 +5,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
 use modbus_reference::Server;
+use modioctl::bus::adu::Framing;
 use register_map::Module;
-use register_map::state::PRODUCT_CODE;
+use register_map::state::{PRODUCT_CODE, UPTIME_MS};
 
 use crate::served::{modio_02, response, serve_requests, server};
 use crate::terminal::{Terminal, wait};
@@ -142,6 +143,31 @@ fn lost_connection_is_opened_again() {
     unit.faults.hangs_up.store(false, Ordering::SeqCst);
     terminal.wait_for("● answers");
     terminal.wait_for("p5.1 digital output      [□ off] good");
+}
+
+#[test]
+fn edges_of_the_selected_input_are_read() {
+    let mut server = server(modio_02(Module::Di4));
+    server.device.words[usize::from(UPTIME_MS) + 1] = 5000;
+    let address = serve_requests(move |unit, pdu| {
+        // The newest 20 edges: the last one is p5.1 on, 2 s before the uptime.
+        const LOG: &[u8] = &[0x14, 7, 6, 0, 3, 0, 133, 0, 60];
+        const EDGE: [u8; 6] = [0x01, 0x10, 0, 0, 0x0B, 0xB8];
+        let edges = [&[0x14, 122, 121, 6][..], &[0; 114], &EDGE].concat();
+        Some(match pdu {
+            LOG => Framing::Rtu.frame(0, unit, &edges),
+            _ => response(&mut server, unit, pdu),
+        })
+    });
+    let mut terminal = Terminal::run(&["--tcp", &address.to_string(), "monitor"]);
+    terminal.wait_for("p5.1 digital input");
+    terminal.wait_for("Last edges:");
+    let text = terminal.text();
+    let line = text.split("Last edges:").nth(1).unwrap().lines().nth(1);
+    let line = line.unwrap();
+    assert!(line.contains("on  ") && line.ends_with(" s ago"), "{text}");
+    terminal.press("q");
+    assert!(terminal.wait_for_end().success());
 }
 
 #[test]

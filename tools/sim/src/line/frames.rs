@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use modbus_line::{Direction, adu::Framing};
+use modbus_line::{Direction, adu::Framing, fast};
 
 use f103::serial::Word;
 use f103::time::Time;
@@ -13,8 +13,11 @@ pub const KEPT: usize = 1000;
 /// Number of bytes after which a frame is cut, in case the line is never silent: sixteen times the longest RTU frame.
 pub const LONGEST: usize = 4096;
 
+/// Character of an arbitration of function 70.
+const ARBITRATION: u8 = 0xFF;
+
 /// A frame on the line, as a receiver with the master's settings receives it. A frame consists of characters of one
-/// sender with less than t3.5 of silence between them.
+/// sender with less than t3.5 of silence between them. The characters of an arbitration are no part of a frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frame {
     /// Number of the frame on this line, from 1.
@@ -63,6 +66,7 @@ impl Record {
             frame.direction == direction
                 && word.start.saturating_sub(frame.end) < silence
                 && frame.bytes.len() < LONGEST
+                && (word.data as u8 == ARBITRATION || !self.is_arbitration(frame))
         });
         if !continues {
             self.close();
@@ -112,10 +116,29 @@ impl Record {
         (self.from_master, self.from_unit)
     }
 
+    /// Returns whether these are characters of the arbitration after a request of function 70, so far.
+    fn is_arbitration(&self, frame: &Frame) -> bool {
+        let arbitrated = |pdu: &[u8]| {
+            use fast::sub::{CONTINUE_SCAN, FETCH, START_SCAN};
+            matches!(
+                pdu,
+                [fast::FUNCTION, START_SCAN | CONTINUE_SCAN | FETCH, ..]
+            )
+        };
+        let is_asked =
+            |(unit, pdu, _): &(u8, Vec<u8>, Time)| *unit == fast::ADDRESS && arbitrated(pdu);
+        frame.direction == Direction::Response
+            && self.request.as_ref().is_some_and(is_asked)
+            && frame.bytes.iter().all(|byte| *byte == ARBITRATION)
+    }
+
     fn close(&mut self) {
         let Some(mut frame) = self.open.take() else {
             return;
         };
+        if self.is_arbitration(&frame) {
+            return;
+        }
         let opened = Framing::on_line(&frame.bytes).and_then(|framing| framing.open(&frame.bytes));
         frame.crc_ok = opened.is_some();
         frame.gap = self.last_end.map(|end| frame.start.saturating_sub(end));
@@ -242,6 +265,25 @@ mod tests {
         ]);
         let checks: Vec<_> = frames.iter().map(|frame| frame.crc_ok).collect();
         assert_eq!(checks, [true, false]);
+    }
+
+    #[test]
+    fn arbitration_in_front_of_a_reply_is_no_frame() {
+        let fetch = Framing::Rtu.frame(0, fast::ADDRESS, &[0x46, 0x10, 0, 64, 0, 0]);
+        let events = Framing::Rtu.frame(0, 1, &[0x46, 0x11, 0, 1, 5, 1, 2, 0, 0, 1]);
+        let joined = [&[0xFF; 3][..], &events].concat();
+        let frames = record(&[
+            (Direction::Request, 0, fetch.clone()),
+            // A 1 is silence, which ends a frame.
+            (Direction::Response, 2000, vec![0xFF; 2]),
+            (Direction::Response, 3000, joined),
+            (Direction::Response, 9000, vec![0xFF; 2]),
+        ]);
+        let bytes: Vec<_> = frames.iter().map(|frame| frame.bytes.clone()).collect();
+        assert_eq!(bytes, [fetch, events, vec![0xFF; 2]]);
+        assert!(frames[1].crc_ok);
+        assert_eq!(frames[1].start, Time::from_us(3300));
+        assert_eq!(frames[1].longest_gap, Time::ZERO);
     }
 
     #[test]

@@ -24,6 +24,12 @@ EXACT = ["--exact-line", "127.0.0.1:0"]
 ENDPOINTS = {"pty": "/dev/pts/3", "tcp": "127.0.0.1:5020", "http": "http://127.0.0.1:8502/"}
 
 
+# Function 70 of unit 2: switches on the events of p1.1 to p1.4 and p2.3, and switches off the event of its start.
+EVENTS_ON = "02461812 020000 04 01010101 010006 01 01 0f0000 01 00"
+# The second of each fetch of events, the level of p1.2 from then on, and unit and flag of the packet that is confirmed.
+FETCHES = {6: (False, "0000"), 15: (True, "0200"), 31: (False, "0201"), 48: (True, "0200")}
+
+
 class Line:
     """The board's line through the exact-line protocol of docs/conformance.md."""
 
@@ -57,7 +63,14 @@ def larger_board(browser, board, line, scheme, file):
     for number in (1, 4):
         board.set_channel(number, energised=True)
     line.request("02050006ff00", 100)
+    line.request(EVENTS_ON, 100)
     for second in range(SECONDS):
+        if second in FETCHES:
+            energised, confirmed = FETCHES[second]
+            board.set_channel(2, energised=energised)
+            expect(page.locator("#c0-2")).to_have_attribute("aria-checked", str(energised).lower())
+            line.ask("run 50000")
+            line.request(f"fd46100040{confirmed}", 100)
         for channel in range(4):
             board.set_channel(channel + 1, port=3, millivolts=value(second, channel))
         level = value(second, 0)

@@ -1,5 +1,6 @@
 //! Draws the details of the selected point: the chart of an analog point, the state of other points.
 
+use chrono::Local;
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
@@ -13,6 +14,7 @@ use crate::links::{self, sentence};
 use crate::monitor::history::{SPAN, extent};
 use crate::monitor::link::ago;
 use crate::monitor::model::Model;
+use crate::monitor::plan::is_digital_input;
 use crate::monitor::tree::Row;
 use crate::names::{Item, Meaning};
 use crate::value::{show, unit_name};
@@ -64,6 +66,12 @@ fn facts(frame: &mut Frame, model: &Model, item: &Item, area: Rect, now: Instant
         lines.push(Line::default());
         lines.extend(links);
     }
+    let mut edges = edges(model, item).peekable();
+    if edges.peek().is_some() {
+        lines.push(Line::default());
+        lines.push(Line::from("Last edges:"));
+        lines.extend(edges);
+    }
     if item.writable {
         lines.push(Line::default());
         lines.push(Line::from("Space switches it."));
@@ -86,6 +94,23 @@ fn links(model: &Model, point: &Item, now: Instant) -> impl Iterator<Item = Line
         let style = if fresh { Style::new() } else { OLD };
         let text = sentence(&model.book, &link, &value.words);
         is_shown.then(|| Line::from(Span::styled(text, style)))
+    })
+}
+
+/// Iterates over the last edges of a digital input, newest first, in words.
+fn edges(model: &Model, item: &Item) -> impl Iterator<Item = Line<'static>> {
+    let now = Local::now();
+    let edges = is_digital_input(item).then(|| model.edges(item.address));
+    edges.into_iter().flatten().map(move |edge| {
+        let level = if edge.on { "on" } else { "off" };
+        let time = edge.at.format("%H:%M:%S%.3f");
+        let age = ago((now - edge.at).to_std().unwrap_or_default());
+        let late = if edge.late {
+            ", or up to 40 ms earlier"
+        } else {
+            ""
+        };
+        Line::from(format!("{level:<3} {time}  {age} ago{late}"))
     })
 }
 

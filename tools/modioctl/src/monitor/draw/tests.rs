@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use chrono::{Local, TimeDelta};
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use register_map::Module;
@@ -12,6 +13,7 @@ use super::draw;
 use crate::bus::adu::Framing;
 use crate::bus::{Direction, Seen};
 use crate::failure::Failure;
+use crate::monitor::edges::Edge;
 use crate::monitor::fixture::{model, polled, show};
 use crate::monitor::messages::Update;
 use crate::monitor::model::{Model, Page};
@@ -199,6 +201,36 @@ fn links_are_shown_at_their_output_and_their_input() {
         let text = screen(&mut model, 80, 24, now).join("\n");
         assert_eq!(text.matches("p1.1 toggles p1.3").count(), count, "{text}");
     }
+}
+
+#[test]
+fn last_edges_of_the_selected_input_are_shown_newest_first() {
+    let now = Instant::now();
+    let mut model = model(Module::Di4, now);
+    let mut round = polled(now, &[0; 4]);
+    // p5.2 off, p5.1 on, p5.2 on; the last one is late. They happened 100, 50 and 20 ms before the reading.
+    let words = [0x11, 0, 900, 0x110, 0, 950, 0x8111, 0, 980];
+    let read_at = Local::now() - TimeDelta::seconds(5);
+    let edges = Edge::all(words.map(u16::to_be_bytes).as_flattened(), 1000, read_at);
+    let time = |ms| read_at - TimeDelta::milliseconds(ms);
+    round.edges = Some(edges);
+    model.update(Update::Polled(round), now);
+    model.tree.select(2);
+    let rows = screen(&mut model, 120, 40, now);
+    let first = rows.iter().position(|row| row.ends_with("Last edges:"));
+    let rows = &rows[first.unwrap() + 1..];
+    let line = |level, ms| format!("{level} {}  5 s ago", time(ms).format("%H:%M:%S%.3f"));
+    assert!(
+        rows[0].ends_with(&format!("{}, or up to 40 ms earlier", line("on ", 20))),
+        "{rows:?}"
+    );
+    assert!(rows[1].ends_with(&line("off", 100)), "{rows:?}");
+    model.tree.select(3);
+    assert!(
+        !screen(&mut model, 80, 24, now)
+            .join("\n")
+            .contains("Last edges")
+    );
 }
 
 #[test]

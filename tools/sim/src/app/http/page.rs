@@ -16,7 +16,7 @@ const CSS: &str = "text/css; charset=utf-8";
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 
 /// Path, type and content of each file, except `/map.js`.
-pub const FILES: [(&str, &str, &str); 17] = [
+pub const FILES: [(&str, &str, &str); 18] = [
     ("/", HTML, include_str!("../page/index.html")),
     ("/page.css", CSS, include_str!("../page/page.css")),
     ("/board.css", CSS, include_str!("../page/board.css")),
@@ -27,6 +27,7 @@ pub const FILES: [(&str, &str, &str); 17] = [
     ("/channels.js", SCRIPT, include_str!("../page/channels.js")),
     ("/chart.js", SCRIPT, include_str!("../page/chart.js")),
     ("/connect.js", SCRIPT, include_str!("../page/connect.js")),
+    ("/events.js", SCRIPT, include_str!("../page/events.js")),
     ("/faults.js", SCRIPT, include_str!("../page/faults.js")),
     ("/frames.js", SCRIPT, include_str!("../page/frames.js")),
     ("/links.js", SCRIPT, include_str!("../page/links.js")),

@@ -1,6 +1,6 @@
 // The board: power, switch, LEDs, line, and the slots with their modules.
 
-import { pointName, slotsOf, terminals } from "/model.js";
+import { address, pointName, slotsOf, terminalName, terminals } from "/model.js";
 import { modules } from "/map.js";
 import { post } from "/api.js";
 import { buildChannel, showChannel } from "/channels.js";
@@ -12,11 +12,14 @@ let shown = null;
 /** The state that is shown; null before the first one. */
 export const current = () => shown;
 
-/** The channels of all slots, each with its name and the number of its element. */
+/** The channels of all slots and the terminals, each with its name, its point, and the id of a channel's element. */
 export function channels(state) {
-  return slotsOf(state).flatMap((slot, n) => slot.channels.map((channel, at) => ({
-    id: idOf(n, at), channel, name: pointName(slot.port, at + 1),
-  })));
+  const fixed = (state.terminals ?? []).map((terminal) => ({
+    id: terminal.name, channel: terminal, name: terminalName(terminal), point: terminal.point,
+  }));
+  return fixed.concat(slotsOf(state).flatMap((slot, n) => slot.channels.map((channel, at) => ({
+    id: idOf(n, at), channel, name: pointName(slot.port, at + 1), point: Number(address(slot.port, at + 1)),
+  }))));
 }
 
 const idOf = (slot, at) => `c${slot}-${at + 1}`;

@@ -18,6 +18,10 @@ let held = null;
 let open = null;
 /** The log was cleared while the earlier frames are fetched, so they are not wanted any more. */
 let unwanted = false;
+/** Called with each frame. */
+let whenAdded = () => {};
+/** Called when the simulator has started again, before its first frame. */
+let whenRestarted = () => {};
 
 const milliseconds = (us) => (us === null ? "" : (us / 1000).toFixed(2));
 
@@ -66,6 +70,7 @@ export function add(frame) {
 function append(frame) {
   if (last !== null && frame.number <= last.number) return;
   last = frame;
+  whenAdded(frame);
   frames.push(frame);
   if (frames.length > KEPT) frames.shift();
   // A hidden page gets no animation frame. It draws nothing, and at most KEPT frames wait for their rows.
@@ -110,20 +115,20 @@ function clear() {
   count();
 }
 
-/** Adds those of all frames of the simulator that are missing. Returns whether the simulator has started again: its
- * frames are then numbered from 1 again, so the last frame is missing or has another start. */
+/** Adds those of all frames of the simulator that are missing. After a new start of the simulator its frames are numbered
+ * from 1 again, so the last frame is missing or has another start. */
 function addMissing(all) {
   const hasRestarted = last !== null && !all.some((frame) => frame.number > last.number
     || (frame.number === last.number && frame.start_us === last.start_us));
   if (hasRestarted) {
     last = null;
     clear();
+    whenRestarted();
   }
   all.slice(-KEPT).forEach(append);
-  return hasRestarted;
 }
 
-/** Fetches the frames since the last one. Returns whether the simulator has started again. */
+/** Fetches the frames since the last one. */
 export async function fetchMissed() {
   held ??= [];
   try {
@@ -132,9 +137,9 @@ export async function fetchMissed() {
       const since = held?.[0]?.number ?? Infinity;
       const cleared = answer.frames.filter((frame) => frame.number < since);
       last = cleared.at(-1) ?? last;
-      return false;
+    } else if (answer !== null) {
+      addMissing(answer.frames);
     }
-    return answer !== null && addMissing(answer.frames);
   } finally {
     const arrived = held ?? [];
     held = null;
@@ -143,8 +148,10 @@ export async function fetchMissed() {
   }
 }
 
-/** Connects the filter and the button that clears the log. */
-export function listen() {
+/** Connects the filter and the button that clears the log. Sets the functions that are called with each frame, and when
+ * the simulator has started again. */
+export function listen(added, restarted) {
+  [whenAdded, whenRestarted] = [added, restarted];
   byId("filter").addEventListener("input", filter);
   byId("clear").addEventListener("click", clear);
 }

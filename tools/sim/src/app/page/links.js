@@ -2,7 +2,7 @@
 // because each request keeps a unit with COMM_TIMEOUT from noticing that its master is gone.
 
 import { actions, readings, registers } from "/map.js";
-import { address, numberOf, pointName, portOf, slotsOf, unitName } from "/model.js";
+import { address, pointName, portOf, slotsOf, terminalName, unitName } from "/model.js";
 import * as modbus from "/modbus.js";
 import { byId, element, select, setText } from "/ui.js";
 
@@ -44,7 +44,7 @@ function pointsOf(state) {
 function pointsOfTerminals(terminals) {
   const all = terminals.filter(({ point, kind }) => point !== undefined && kind !== "output").map(({ name, kind, point }) => ({
     port: portOf(point), kind: ["voltage", "current", "potentiometer"].includes(kind) ? "ai" : "di",
-    name: `${pointName(portOf(point), numberOf(point))} (${name})`, address: point, isOutput: kind === "relay",
+    name: terminalName({ name, point }), address: point, isOutput: kind === "relay",
   }));
   return { inputs: all.filter((each) => !each.isOutput), outputs: all.filter((each) => each.isOutput) };
 }

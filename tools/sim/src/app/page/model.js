@@ -51,6 +51,19 @@ export function share(channel) {
   return null;
 }
 
+/** The levels of digital inputs as the unit reads them, by the kind of the channel or terminal: a relay has its jumper, and
+ * switch and supply are inverted (docs/boards.md). */
+const LEVELS = {
+  di: (channel) => channel.energised,
+  relay: (channel) => channel.manual ?? null,
+  input: (terminal) => terminal.energised,
+  switch: (terminal) => !terminal.high,
+  supply: (terminal) => !terminal.present,
+};
+
+/** Returns whether a digital input is on; null for any other channel or terminal. */
+export const level = (channel) => LEVELS[channel.kind]?.(channel) ?? null;
+
 /** Labels of the five screw terminals of modules that do not have one terminal for each point. */
 const LABELS = {
   none: ["", "", "", "", ""],
@@ -84,6 +97,12 @@ export function address(port, number) {
 /** Returns the port of an address, and the number of the point in it, from 1. */
 export const portOf = (point) => Math.floor(point / 4) + 1;
 export const numberOf = (point) => (point % 4) + 1;
+
+/** Returns the name of the point with an address. */
+export const nameOf = (point) => pointName(portOf(point), numberOf(point));
+
+/** Returns the name of a terminal with that of its point, if it has one. */
+export const terminalName = ({ name, point }) => (point === undefined ? name : `${nameOf(point)} (${name})`);
 
 /** Returns the name of a unit in UCUM, for people. */
 export const unitName = (code) => ({ Cel: "°C", uA: "µA" })[code] ?? code;

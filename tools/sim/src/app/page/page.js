@@ -10,7 +10,7 @@ import * as frames from "/frames.js";
 import * as links from "/links.js";
 import { byId, element, setText } from "/ui.js";
 
-const SAMPLE_MS = 250;
+const DRAW_MS = 250;
 const POLL_MS = 2000;
 const FINDINGS_SHOWN = 50;
 
@@ -20,9 +20,7 @@ let events = null;
 function begin(state) {
   show(state);
   connect.fetchEndpoints().catch(() => {});
-  frames.fetchMissed().then((hasRestarted) => {
-    if (hasRestarted) chart.reset();
-  }).catch(() => {});
+  frames.fetchMissed().catch(() => {});
 }
 
 /** Shows a later state. Drops a state that is older than the one shown. */
@@ -32,6 +30,7 @@ function take(state) {
 
 function show(state) {
   board.show(state);
+  chart.add(state);
   connect.show(state);
   links.show(state);
 }
@@ -96,9 +95,12 @@ function choose(name) {
 
 api.onChange(take);
 board.listen();
-frames.listen();
+frames.listen(chart.addFrame, () => {
+  chart.reset();
+  chart.add(board.current());
+});
 links.listen();
-setInterval(() => board.current() && chart.sample(board.current()), SAMPLE_MS);
+setInterval(chart.draw, DRAW_MS);
 setInterval(poll, POLL_MS);
 faults.refresh();
 listen();

@@ -4,8 +4,13 @@ export const byId = (id) => document.getElementById(id);
 
 /** Makes an element. An attribute whose name begins with `on` is a listener. The value `true` makes an attribute without
  * a value; `false` and `undefined` make none. */
-export function element(tag, attributes = {}, ...children) {
-  const made = document.createElement(tag);
+export const element = (tag, attributes = {}, ...children) => filled(document.createElement(tag), attributes, children);
+
+/** Makes an element of an SVG drawing. */
+export const drawing = (tag, attributes, ...children) =>
+  filled(document.createElementNS("http://www.w3.org/2000/svg", tag), attributes, children);
+
+function filled(made, attributes, children) {
   for (const [name, value] of Object.entries(attributes)) {
     if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
     else if (value === true) made.setAttribute(name, "");
