@@ -131,6 +131,8 @@ pub fn program(
         cargo.args(["--features", &format!("slot-{letter}")]);
     }
     cargo.arg("--target-dir").arg(&target);
+    // The boards share what is compiled for all of them.
+    cargo.env("CARGO_BUILD_BUILD_DIR", &workspace.target);
     // The variables that firmware/build.rs and loader/build.rs read.
     cargo.envs(map.map(|map| ("MODIO_MAP", map)));
     cargo.envs(workspace.keys.as_ref().map(|keys| ("MODIO_KEYS", keys)));
@@ -153,7 +155,9 @@ pub fn program(
     let flash = image::flat(&bytes, board.memory().part.flash)?;
     image::check(&bytes)?;
     fs::write(elf.with_extension("bin"), flash)?;
-    let packages = workspace::packages(&artifacts, &target.join(TARGET));
+    // Programs are in the first one, libraries in the second one.
+    let compiled = [&target, &workspace.target].map(|directory| directory.join(TARGET));
+    let packages = workspace::packages(&artifacts, &compiled);
     Ok(Built { elf, packages })
 }
 
@@ -167,7 +171,7 @@ pub fn slot(letter: &str) -> Result<Slot, String> {
 }
 
 /// Returns the target directory of a board. The images have the same name, so each board has a separate directory:
-/// building for one board neither replaces the image of the other nor compiles it again.
+/// building for one board does not replace the image of the other.
 pub fn target(directory: &Path, board: &Board) -> PathBuf {
     if *board == MODIO_02 {
         directory.to_owned()

@@ -6,6 +6,7 @@ use std::path::{self, Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context as _, Result};
+use cargo_metadata::camino::Utf8PathBuf;
 use cargo_metadata::{Artifact, Message, MetadataCommand, PackageId};
 
 use crate::command;
@@ -121,11 +122,14 @@ pub fn artifacts(cargo: &mut Command) -> Result<Vec<Artifact>> {
     Ok(artifacts)
 }
 
-/// Returns the packages that were compiled into a directory.
-pub fn packages(artifacts: &[Artifact], directory: &Path) -> Vec<PackageId> {
+/// Returns the packages that were compiled into one of these directories.
+pub fn packages(artifacts: &[Artifact], directories: &[PathBuf]) -> Vec<PackageId> {
     let compiled = artifacts.iter().filter(|artifact| {
-        let mut files = artifact.filenames.iter();
-        files.any(|file| file.as_std_path().starts_with(directory))
+        let is_there = |file: &Utf8PathBuf| {
+            let mut directories = directories.iter();
+            directories.any(|directory| file.as_std_path().starts_with(directory))
+        };
+        artifact.filenames.iter().any(is_there)
     });
     compiled.map(|built| built.package_id.clone()).collect()
 }

@@ -56,7 +56,7 @@ pub fn files(
     // The variable that tools/sim/build.rs reads.
     cargo.env("MODIO_SIM_IMAGES", &inside);
     let artifacts = workspace::artifacts(&mut cargo)?;
-    let compiled = workspace::packages(&artifacts, &workspace.target.join(target));
+    let compiled = workspace::packages(&artifacts, &[workspace.target.join(target)]);
     let version = rustc(&["--version"])?;
     for (package, program) in PROGRAMS {
         let built = workspace::executable(&artifacts, program)?;
