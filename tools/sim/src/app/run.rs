@@ -13,7 +13,7 @@ use super::bench::Bench;
 use super::exact_line::Requests;
 use super::gdb::Session;
 use super::live::Live;
-use super::pace::{Pace, span};
+use super::pace::{Pace, Speed, span};
 use super::{Event, Hold, Origin, api, pty, tcp};
 
 /// Longest time between two updates of the boards: no byte waits longer to be passed on.
@@ -75,6 +75,7 @@ pub fn until_stopped(
             Endpoints::Clock { .. } => Some(Pace::new(begin, bench.now())),
             Endpoints::Exact(_) => None,
         },
+        speed: Speed::new(begin, bench.now()),
         debugger: Session::default(),
     };
     let mut requests = Requests::default();
@@ -185,6 +186,7 @@ pub fn until_stopped(
 struct Clock {
     /// The wall clock; `None` when time passes on request only.
     pace: Option<Pace>,
+    speed: Speed,
     debugger: Session,
 }
 
@@ -192,7 +194,9 @@ impl Clock {
     /// Pairs the present of the wall clock with the virtual time `at`.
     fn restart(&mut self, at: Time) {
         if let Some(pace) = &mut self.pace {
-            *pace = Pace::new(Instant::now(), at);
+            let wall = Instant::now();
+            *pace = Pace::new(wall, at);
+            self.speed.restart(wall, at);
         }
     }
 
@@ -204,7 +208,13 @@ impl Clock {
             return self.restart(at);
         }
         if let Some(pace) = &mut self.pace {
-            let target = pace.target(Instant::now(), at);
+            let wall = Instant::now();
+            let target = pace.target(wall, at);
+            if let Some(percent) = self.speed.too_low(wall, at) {
+                eprintln!(
+                    "modio-sim: warning: this computer has run the boards at {percent} % of their speed in the last 10 s: if that goes on, give masters a longer time-out, or simulate fewer boards"
+                );
+            }
             self.debugger
                 .run_until(target.min(at + span(AT_ONCE)), bench);
         }
