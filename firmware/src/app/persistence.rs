@@ -81,7 +81,8 @@ impl Persistence {
     /// Erases the page that is no longer needed, if there is one, so that the next save does not have to. This
     /// takes up to 40 ms, during which only the tasks in RAM run.
     pub fn erase(&mut self) {
-        if !self.erase || !self.pages.has_supply() {
+        // A save that waits for the supply may have begun on that page.
+        if !self.erase || self.saving.is_some() || !self.pages.has_supply() {
             return;
         }
         self.erase = false;
