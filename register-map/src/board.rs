@@ -424,7 +424,11 @@ mod tests {
         }
         assert_eq!(Board::from_code(0), None);
         let error = "nucleo".parse::<&Board>().unwrap_err();
-        assert!((error.to_string()).starts_with("not a board; one of modio-02, modio-08, "));
+        let names = Board::ALL.map(|board| board.name).join(", ");
+        assert_eq!(
+            error.to_string(),
+            std::format!("not a board; one of {names}")
+        );
     }
 
     #[test]

@@ -6,7 +6,6 @@ use std::path::{self, Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context as _, Result};
-use cargo_metadata::camino::Utf8PathBuf;
 use cargo_metadata::{Artifact, Message, MetadataCommand, PackageId};
 
 use crate::command;
@@ -125,11 +124,11 @@ pub fn artifacts(cargo: &mut Command) -> Result<Vec<Artifact>> {
 /// Returns the packages that were compiled into one of these directories.
 pub fn packages(artifacts: &[Artifact], directories: &[PathBuf]) -> Vec<PackageId> {
     let compiled = artifacts.iter().filter(|artifact| {
-        let is_there = |file: &Utf8PathBuf| {
-            let mut directories = directories.iter();
-            directories.any(|directory| file.as_std_path().starts_with(directory))
+        let is_in = |directory: &PathBuf| {
+            let mut files = artifact.filenames.iter();
+            files.any(|file| file.starts_with(directory))
         };
-        artifact.filenames.iter().any(is_there)
+        directories.iter().any(is_in)
     });
     compiled.map(|built| built.package_id.clone()).collect()
 }

@@ -249,8 +249,14 @@ pub fn write_words(address: u16, values: &[u16]) -> Vec<u8> {
 /// Returns the words of a response to function 03, 04 or 17.
 #[must_use]
 pub fn words_of(response: &[u8]) -> Vec<u16> {
-    let (pairs, _) = response.get(2..).unwrap_or_default().as_chunks::<2>();
-    pairs.iter().map(|pair| u16::from_be_bytes(*pair)).collect()
+    words(response.get(2..).unwrap_or_default())
+}
+
+/// Returns the words of registers or records, high byte first.
+#[must_use]
+pub fn words(bytes: &[u8]) -> Vec<u16> {
+    let (pairs, _) = bytes.as_chunks();
+    pairs.iter().copied().map(u16::from_be_bytes).collect()
 }
 
 #[cfg(test)]

@@ -71,13 +71,14 @@ impl Device {
         let lines: Vec<_> = std::iter::once(had).chain(announced).collect();
         let answering = self.find_line(&lines, &before).await?;
         self.master.be_patient(usual.0, usual.1);
-        if lines.len() > 1 {
-            let shown = shown(&lines, answering);
+        if let [had, announced] = &lines[..] {
             let text = if answering == 0 {
+                let shown = shown(had, announced);
                 format!(
                     "the unit still answers with {shown}: other values of BAUD, FORMAT, MODE and UNIT were not saved, or are for another line"
                 )
             } else {
+                let shown = shown(announced, had);
                 format!("the unit now answers with {shown}: use that in your next command")
             };
             output::line(text)?;
@@ -112,11 +113,11 @@ impl Device {
             }
         }
         Err(match lines {
-            [had, _] => Failure::NoAnswer(format!(
+            [had, announced] => Failure::NoAnswer(format!(
                 "unit {} does not answer after the restart, neither with the {} that it had nor with the {} that it announced: {}",
                 had.unit,
-                shown(lines, 0),
-                shown(lines, 1),
+                shown(had, announced),
+                shown(announced, had),
                 if self.is_serial() {
                     "`modioctl --timeout 0.2s scan --rates all --formats all` looks for it"
                 } else {
@@ -229,14 +230,11 @@ fn change_line(endpoint: &mut Endpoint, baud: u16, format: u16, mode: u16) {
     }
 }
 
-/// Describes rate, format and framing of one of these endpoints for people, and the address if they differ in it. Only
+/// Describes rate, format and framing of an endpoint for people, and its address if that of the other one differs. Only
 /// the framing matters to a gateway.
-fn shown(all: &[Endpoint], index: usize) -> String {
-    let Some(endpoint) = all.get(index) else {
-        return String::new();
-    };
+fn shown(endpoint: &Endpoint, other: &Endpoint) -> String {
     let mut parts = Vec::new();
-    if all.iter().any(|other| other.unit != endpoint.unit) {
+    if endpoint.unit != other.unit {
         parts.push(format!("address {},", endpoint.unit));
     }
     if endpoint.place.is_serial() {
@@ -273,8 +271,8 @@ mod tests {
         let serial = Endpoint::new(Place::Serial("COM3".to_owned()), Framing::Rtu);
         let tcp = Endpoint::new(Place::Tcp("a:1".to_owned()), Framing::Rtu);
         let line = |now: &Endpoint, words: [u16; 3], unit| {
-            let both = [now.clone(), announced(now, &words, unit)?];
-            Some(shown(&both, 1))
+            let then = announced(now, &words, unit)?;
+            Some(shown(&then, now))
         };
         assert_eq!(line(&serial, [96, 0, 0], None), None);
         assert_eq!(line(&serial, [0, 99, 99], Some(1)), None);

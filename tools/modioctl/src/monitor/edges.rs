@@ -1,6 +1,7 @@
 //! The last edges of digital inputs, from the log of the unit (docs/time-and-links.md).
 
 use chrono::{DateTime, Local, TimeDelta};
+use modbus_line::adu::words;
 use register_map::edges::log::{END, LATE, LEVEL_SHIFT, RECORDS};
 
 use crate::value::long;
@@ -31,8 +32,7 @@ pub struct Edge {
 impl Edge {
     /// Returns the edges in these records, newest first. The unit had the uptime at the time `now`.
     pub fn all(records: &[u8], uptime_ms: u32, now: DateTime<Local>) -> Vec<Self> {
-        let (words, _) = records.as_chunks();
-        let words: Vec<_> = words.iter().map(|word| u16::from_be_bytes(*word)).collect();
+        let words = words(records);
         let (edges, _) = words.as_chunks::<{ RECORDS as usize }>();
         let edges = edges.iter().rev().filter_map(|[first, time @ ..]| {
             let at_ms = long(time);

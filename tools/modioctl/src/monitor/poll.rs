@@ -203,10 +203,10 @@ impl Poller {
     async fn edges(&mut self, plan: &Plan) -> Result<Option<Vec<Edge>>, Failure> {
         if !self.wants_edges.load(Ordering::Relaxed) {
             self.logged = None;
+            return Ok(None);
         }
-        let is_due = self.wants_edges.load(Ordering::Relaxed)
-            && self.logged.is_none_or(|logged| logged.elapsed() >= SELDOM)
-            && self.writes.is_empty();
+        let is_due =
+            self.logged.is_none_or(|logged| logged.elapsed() >= SELDOM) && self.writes.is_empty();
         let (true, Some(uptime), Some(device)) = (is_due, &plan.uptime_ms, &mut self.device) else {
             return Ok(None);
         };

@@ -118,17 +118,14 @@ impl Record {
 
     /// Returns whether these are characters of the arbitration after a request of function 70, so far.
     fn is_arbitration(&self, frame: &Frame) -> bool {
-        let arbitrated = |pdu: &[u8]| {
-            use fast::sub::{CONTINUE_SCAN, FETCH, START_SCAN};
-            matches!(
-                pdu,
-                [fast::FUNCTION, START_SCAN | CONTINUE_SCAN | FETCH, ..]
-            )
+        use fast::sub::{CONTINUE_SCAN, FETCH, START_SCAN};
+        let Some((fast::ADDRESS, request, _)) = &self.request else {
+            return false;
         };
-        let is_asked =
-            |(unit, pdu, _): &(u8, Vec<u8>, Time)| *unit == fast::ADDRESS && arbitrated(pdu);
-        frame.direction == Direction::Response
-            && self.request.as_ref().is_some_and(is_asked)
+        matches!(
+            request[..],
+            [fast::FUNCTION, START_SCAN | CONTINUE_SCAN | FETCH, ..]
+        ) && frame.direction == Direction::Response
             && frame.bytes.iter().all(|byte| *byte == ARBITRATION)
     }
 

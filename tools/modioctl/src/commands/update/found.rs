@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use modbus_line::adu;
 use register_map::Board;
 use register_map::state::{PRODUCT, PRODUCT_CODE, UPDATE, update};
 use register_map::update::{Reason, Slot, State, status};
@@ -63,9 +64,7 @@ async fn ask(device: &mut Device) -> Result<Found, Failure> {
         Err(failure) => return Err(failure),
     };
     let time = asked.elapsed();
-    let (words, _) = file.as_chunks();
-    let words: Vec<_> = words.iter().copied().map(u16::from_be_bytes).collect();
-    let status = Status::of(&words).ok_or_else(|| {
+    let status = Status::of(&adu::words(&file)).ok_or_else(|| {
         wrong("reports an update that this program does not understand: a newer modioctl may be needed")
     })?;
     let register = device.read_words(UPDATE, 1).await?;
