@@ -19,6 +19,7 @@ mod built;
 pub mod byte_queue;
 pub mod config;
 pub mod device;
+pub mod kept_outputs;
 pub mod leds;
 pub mod line;
 pub mod links;

@@ -7,9 +7,9 @@ use register_map::points;
 use crate::KEEPS_OUTPUTS;
 use crate::budget::Budget;
 
-/// Number of records that are possible after a power-on: as few as are useful, so that a supply that fails again and again
-/// does not wear the flash.
-pub const AFTER_POWER_ON: u8 = 1;
+/// Number of records that are possible after a power-on: a few, so that a supply that fails again and again does not wear
+/// the flash.
+pub const AFTER_POWER_ON: u8 = 4;
 
 /// The values of the outputs that are to start as they were, as pairs of a record.
 pub type Outputs = Vec<(u16, u16), MOST>;

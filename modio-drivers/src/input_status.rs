@@ -7,7 +7,7 @@
 use register_map::limits::{MAX_TENTHS, MIN_TENTHS};
 
 use crate::scale::Measured;
-use crate::{ChannelStatus, Code};
+use crate::{ChannelSettings, ChannelStatus, Code, Signal};
 
 /// A 4-20 mA loop below this current, in uA, is under range. A transmitter signals its own failure with 3.6 mA or
 /// less, and measures down to 3.8 mA (NAMUR NE 43).
@@ -46,6 +46,27 @@ pub fn judge(code: Code, measured: Measured, before: ChannelStatus) -> ChannelSt
         Measured::Microamps(ua) => current(code, ua, before),
         Measured::TenthsCelsius(tenths) => thermistor(code, tenths, before),
     }
+}
+
+/// The smallest code at which a thermistor can be colder than [`MIN_TENTHS`], for the constants that BETA allows. Below it
+/// [`is_implausible`] needs no temperature, whose computation is long.
+const COLD_CODE: u16 = 3_500;
+
+/// Returns whether a single code lies under the range, or shows an open or a short circuit.
+#[must_use]
+pub fn is_implausible(code: Code, settings: &ChannelSettings) -> bool {
+    let is_cold = match settings.signal {
+        // Nothing of it can be distinguished from 0 V.
+        Signal::Voltage => return false,
+        Signal::Current => true,
+        Signal::Ntc => code.get() >= COLD_CODE,
+    };
+    let is_suspect = is_cold || code.get() <= SHORT_CIRCUIT_CODE;
+    is_suspect
+        && !matches!(
+            judge(code, Measured::of(code, settings), ChannelStatus::Good),
+            ChannelStatus::Good | ChannelStatus::OverRange
+        )
 }
 
 fn saturation(code: Code, before: ChannelStatus) -> ChannelStatus {
@@ -206,6 +227,24 @@ mod tests {
                 (16, ShortCircuit),
             ];
             assert_eq!(down, expected, "beta {beta}");
+        }
+    }
+
+    #[test]
+    fn implausible_codes_are_those_under_range_and_those_of_an_open_or_a_short_circuit() {
+        for signal in [Signal::Voltage, Signal::Current, Signal::Ntc] {
+            for beta in (BETA_MIN..=BETA_MAX).step_by(250) {
+                let settings = ChannelSettings {
+                    beta,
+                    ..settings(signal)
+                };
+                for code in 0..=4095 {
+                    let status = judge_code(code, &settings, None);
+                    let expected = matches!(status, UnderRange | OpenCircuit | ShortCircuit);
+                    let found = is_implausible(Code::new(code), &settings);
+                    assert_eq!(found, expected, "{signal:?}, beta {beta}, code {code}");
+                }
+            }
         }
     }
 

@@ -233,6 +233,7 @@ codes! {
         Pulse = 0x004 "pulse",
         Set = 0x005 "set",
         Reset = 0x006 "reset",
+        Change = 0x007 "change",
         NoneAlone = 0x100 "none if alone",
         FollowAlone = 0x101 "follow if alone",
         InvertAlone = 0x102 "invert if alone",
@@ -240,6 +241,7 @@ codes! {
         PulseAlone = 0x104 "pulse if alone",
         SetAlone = 0x105 "set if alone",
         ResetAlone = 0x106 "reset if alone",
+        ChangeAlone = 0x107 "change if alone",
     }
 }
 

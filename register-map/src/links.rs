@@ -29,7 +29,7 @@ static FIELDS: [Field; WORDS as usize] = [
     Field::new(
         "action",
         Value::Codes(LinkAction::NAMES),
-        Values::up_to(0x106),
+        Values::up_to(LinkAction::ChangeAlone.code()),
         0,
     ),
     Field::new("time or high", Value::NUMBER, Values::ANY, 0),

@@ -163,6 +163,25 @@ impl<const SLOTS: usize> Config<SLOTS> {
         })
     }
 
+    /// Notes which links a write has written, also with the values that they had.
+    pub(super) fn note_links(&mut self, span: Span) {
+        if !Links::<SLOTS>::contain(span.start()) {
+            return;
+        }
+        for address in span.addresses() {
+            if let Some((slot, index)) = self.edited.links.place(address)
+                && let Some(links) = self.written_links.get_mut(slot)
+            {
+                *links |= 1 << index;
+            }
+        }
+    }
+
+    /// Returns the links of a slot that were written since the last call, a bit for each. COMMAND 3 and 4 write all links.
+    pub fn take_written_links(&mut self, slot: usize) -> u8 {
+        self.written_links.get_mut(slot).map_or(0, core::mem::take)
+    }
+
     /// Returns a link that is in force: until the restart one from or to a port whose MODULE has changed is not.
     #[must_use]
     pub fn link(&self, slot: usize, index: usize) -> &Link {

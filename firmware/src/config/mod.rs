@@ -104,6 +104,8 @@ pub struct Config<const SLOTS: usize> {
     /// Ports whose MODULE has differed from the one in force since the start, or since changes were last dropped.
     /// Bit 0 is the board's first port.
     left: u8,
+    /// Links of each slot that were written and are to begin again, a bit for each.
+    written_links: [u8; SLOTS],
     revision: u16,
 }
 
@@ -136,6 +138,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
             invalid,
             waiting: false,
             left: 0,
+            written_links: [0; SLOTS],
             revision: 0,
         }
     }
@@ -369,6 +372,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
                     _ => self.edited.set(address, value),
                 }
             }
+            self.note_links(span);
         }
         if span != Span::single(KEY) && span != Span::single(COMMAND) {
             self.revision = self.revision.wrapping_add(1);
@@ -432,12 +436,14 @@ impl<const SLOTS: usize> Config<SLOTS> {
     /// COMMAND 3: sets every setting to its default. These values are not stored in flash.
     pub fn load_defaults(&mut self) {
         self.edited = Settings::defaults(self.board);
+        self.written_links = [u8::MAX; SLOTS];
         self.revision = self.revision.wrapping_add(1);
     }
 
     /// COMMAND 4: sets every setting to its saved value.
     pub fn drop_changes(&mut self) {
         self.edited = self.saved;
+        self.written_links = [u8::MAX; SLOTS];
         self.left = 0;
         self.revision = self.revision.wrapping_add(1);
     }

@@ -1,14 +1,66 @@
-//! Outputs that start as they were: what is stored of them, and what a start does with it.
+//! Outputs that start as they were: what is stored of them, what a reset keeps, and what a start does with both.
 
 use modio_drivers::{CHANNELS, Kind};
 use register_map::limits::RAW_MAX;
 use register_map::record::{BITS, OUTPUTS, Record};
 
 use super::Device;
+use crate::KEEPS_OUTPUTS;
+use crate::kept_outputs::KeptOutputs;
 use crate::outputs::Outputs;
 
 impl<const SLOTS: usize> Device<SLOTS> {
-    /// Returns what a master or a link commanded last of the outputs that are to start as they were, to be stored.
+    /// Sets the outputs at a start. `stored` is the last record, `kept` what a reset that was not a power-on has kept.
+    ///
+    /// - An output that is to start as it was has its kept value, else its stored one.
+    /// - An output that a link held has its kept value, if it still has such a link.
+    /// - Every other output keeps START.
+    #[inline(never)]
+    pub fn start_outputs(&mut self, kept: Option<&KeptOutputs>, stored: Option<&Record<'_>>) {
+        if KEEPS_OUTPUTS && let Some(stored) = stored {
+            self.restore(stored);
+        }
+        let kept = kept.filter(|kept| kept.modules == self.modules_in_force());
+        let mut held = [0; SLOTS];
+        for (slot, held) in held.iter_mut().enumerate() {
+            let Some(kept) = kept else {
+                break;
+            };
+            let first = self.points.first_of(slot);
+            *held = (kept.held >> (first & 31)) as u8 & self.linking.with_any_level(slot);
+            for channel in 0..CHANNELS {
+                let is_held = *held >> channel & 1 != 0;
+                if (is_held || self.kept_at(slot, channel).is_some())
+                    && let Some(value) = kept.value(first.wrapping_add(channel as u16))
+                    && let Some(port) = self.points.ports_mut().get_mut(slot)
+                {
+                    port.command_raw(channel, value);
+                }
+            }
+        }
+        self.begin_links(|slot| held.get(slot).copied().unwrap_or_default());
+    }
+
+    /// Returns the modules in force, 4 bits for each port, port 1 lowest.
+    #[must_use]
+    pub fn modules_in_force(&self) -> u32 {
+        let first = u32::from(self.config.board().first_port.wrapping_sub(1));
+        let modules = (first..).zip(self.config.modules());
+        modules.fold(0, |word, (port, module)| {
+            word | u32::from(module.code()) << (4 * port & 31)
+        })
+    }
+
+    /// Returns the outputs, by address, that are to have after a reset what they have now, because a link holds them.
+    #[must_use]
+    pub fn held_outputs(&self) -> u32 {
+        (0..SLOTS).fold(0, |mask, slot| {
+            mask | u32::from(self.linking.to_keep(slot)) << (self.points.first_of(slot) & 31)
+        })
+    }
+
+    /// Returns what a master or a link commanded last of the outputs that are to start as they were, to be stored. Those
+    /// that a link always holds are left out: they would change as often as their source.
     #[must_use]
     #[inline(never)]
     pub fn outputs(&self) -> Outputs {
@@ -18,6 +70,9 @@ impl<const SLOTS: usize> Device<SLOTS> {
                 let Some(address) = self.kept_at(slot, channel) else {
                     continue;
                 };
+                if self.linking.held_always(slot) >> channel & 1 != 0 {
+                    continue;
+                }
                 let mut value = self.points.commanded(slot * CHANNELS + channel);
                 if address & BITS != 0 {
                     value = (0x100 | value) << channel;
@@ -34,8 +89,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
 
     /// Commands the outputs that are to start as they were, from a record. Ignores values of another module than the
     /// one in force, and values out of range.
-    #[inline(never)]
-    pub fn restore(&mut self, stored: &Record<'_>) {
+    fn restore(&mut self, stored: &Record<'_>) {
         for slot in 0..SLOTS {
             for channel in 0..CHANNELS {
                 let Some(address) = self.kept_at(slot, channel) else {

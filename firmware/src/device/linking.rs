@@ -1,14 +1,143 @@
 //! Runs the links: inputs that switch outputs without a master.
 
-use modio_drivers::{CHANNELS, Kind};
+use modio_drivers::{CHANNELS, Channels, Kind, Quality};
 use register_map::links;
 
-use super::Device;
-use crate::links::{Link, OF_A_SLOT};
+use super::{Device, IoPort};
+use crate::links::{AFTER_POWER_ON_MS, OF_A_SLOT, Outputs, Source, Sources};
+
+/// The links of a device with `SLOTS` slots, while they run.
+#[derive(Debug)]
+pub(super) struct Linking<const SLOTS: usize> {
+    outputs: [Outputs; SLOTS],
+    sources: [Sources; SLOTS],
+    /// The communication watchdog has expired, as the scan under way has found it.
+    alone: bool,
+    /// A second of the uptime has begun with this scan: words are compared with the thresholds.
+    look: bool,
+    /// There are links that hold their output until a master writes it.
+    holding: bool,
+}
+
+impl<const SLOTS: usize> Linking<SLOTS> {
+    pub const fn new() -> Self {
+        Self {
+            outputs: [const { Outputs::new() }; SLOTS],
+            sources: [const { Sources::new() }; SLOTS],
+            alone: false,
+            look: false,
+            holding: false,
+        }
+    }
+
+    /// Returns the outputs of a slot with a level link that acts, channel 1 in bit 0.
+    pub fn with_level(&self, slot: usize) -> u8 {
+        self.outputs.get(slot).map_or(0, Outputs::with_level)
+    }
+
+    /// Returns the outputs of a slot with a level link, whether it acts or not, channel 1 in bit 0.
+    pub fn with_any_level(&self, slot: usize) -> u8 {
+        self.outputs.get(slot).map_or(0, Outputs::with_any_level)
+    }
+
+    /// Returns the outputs of a slot that are to have after a reset what they have now, channel 1 in bit 0.
+    pub fn to_keep(&self, slot: usize) -> u8 {
+        self.outputs.get(slot).map_or(0, Outputs::to_keep)
+    }
+
+    /// Returns the outputs of a slot that a link holds that always acts, channel 1 in bit 0.
+    pub fn held_always(&self, slot: usize) -> u8 {
+        self.outputs.get(slot).map_or(0, Outputs::held_always)
+    }
+}
 
 impl<const SLOTS: usize> Device<SLOTS> {
-    /// Ends the pulses of a slot's outputs, and runs the links to them with the inputs of a scan of all slots. The levels at
-    /// the first scan are no edges.
+    /// Begins with sources that have no values yet, and with outputs that may have been held before the reset: those of
+    /// each slot that `held` returns, channel 1 in bit 0.
+    pub(super) fn begin_links(&mut self, held: impl Fn(usize) -> u8) {
+        if !links::exist(SLOTS) {
+            return;
+        }
+        let powered_on = self.state.was_powered_on();
+        let Self {
+            points, linking, ..
+        } = self;
+        for (slot, port) in points.ports().iter().enumerate() {
+            if let Some(sources) = linking.sources.get_mut(slot) {
+                for channel in 0..CHANNELS {
+                    begin_source(sources, port, channel, powered_on);
+                }
+            }
+            if let Some(outputs) = linking.outputs.get_mut(slot) {
+                let on = if powered_on { 0 } else { port.channels().bits() };
+                outputs.forget(u8::MAX, on);
+                outputs.begin_held(held(slot));
+            }
+        }
+    }
+
+    /// Takes the links from the settings after these may have changed. `changed` returns the channels of a slot whose
+    /// settings differ from those before, channel 1 in bit 0.
+    pub(super) fn set_up_links(&mut self, changed: &[u8; SLOTS]) {
+        if !links::exist(SLOTS) {
+            return;
+        }
+        for (slot, channels) in changed.iter().enumerate() {
+            let ports = self.points.ports();
+            let (Some(sources), Some(port)) = (self.linking.sources.get_mut(slot), ports.get(slot)) else {
+                continue;
+            };
+            for channel in (0..CHANNELS).filter(|channel| channels >> channel & 1 != 0) {
+                // As after a power-on.
+                begin_source(sources, port, channel, true);
+            }
+        }
+        for slot in 0..SLOTS {
+            let written = self.config.take_written_links(slot);
+            let links = (0..OF_A_SLOT).map(|index| self.config.link(slot, index));
+            let of_changed = links.clone().enumerate().filter(|(_, link)| {
+                let place = link.source().and_then(|point| self.points.index_of(point));
+                place.is_some_and(|(slot, channel)| {
+                    changed.get(slot).is_some_and(|channels| channels >> channel & 1 != 0)
+                })
+            });
+            let of_changed = of_changed.fold(0, |mask, (index, _)| mask | 1 << index);
+            let port = self.points.ports().get(slot);
+            if let (Some(outputs), Some(port)) = (self.linking.outputs.get_mut(slot), port) {
+                outputs.set_up(links);
+                outputs.forget(of_changed, port.channels().bits());
+                outputs.written(written);
+            }
+        }
+    }
+
+    /// Advances the links by `ms` milliseconds, at the begin of a scan. `second`: a second of the uptime has begun.
+    pub(super) fn tick_links(&mut self, ms: u32, second: bool) {
+        if !links::exist(SLOTS) {
+            return;
+        }
+        self.linking.alone = self.comm_watchdog.has_expired();
+        self.linking.look = second;
+        self.linking.holding = false;
+        for outputs in &mut self.linking.outputs {
+            outputs.tick(ms, self.linking.alone);
+            self.linking.holding |= outputs.is_holding();
+        }
+    }
+
+    /// Stores the inputs of a scan of a slot as sources, `ms` milliseconds after the one before. `changed`: the digital
+    /// inputs that have changed, channel 1 in bit 0.
+    pub(super) fn scanned_sources(&mut self, slot: usize, changed: u8, ms: u32) {
+        if links::exist(SLOTS)
+            && let Some(port) = self.points.ports().get(slot)
+            && let Some(sources) = self.linking.sources.get_mut(slot)
+        {
+            let bad = port.failing() | port.channels().bad();
+            sources.scanned(bad, changed, ms);
+        }
+    }
+
+    /// Ends the pulses of a slot's outputs, and runs the links to them with the inputs of the last scan.
     pub fn run_links(&mut self, slot: usize) {
         if !links::exist(SLOTS) {
             return;
@@ -17,83 +146,126 @@ impl<const SLOTS: usize> Device<SLOTS> {
         if let Some(port) = self.points.ports_mut().get_mut(slot) {
             port.end_pulses(now);
         }
-        let bit = 1 << (slot & 7);
-        if self.has_links {
-            let act = self.linked & bit != 0;
-            self.update_links(slot, act, act && self.linked_words & bit != 0);
-        }
-        self.linked |= bit;
-        self.links_due &= !bit;
-        if self.words_scanned {
-            self.linked_words |= bit;
+        if self.linking.outputs.get(slot).is_some_and(Outputs::exist) {
+            self.run_slot(slot, now);
         }
     }
 
-    /// Notes that a scan has read the inputs, so that the links are to run. `words` is false when the words have the unit of
-    /// the settings before.
-    pub(super) const fn links_are_due(&mut self, words: bool) {
-        self.links_due = u8::MAX;
-        self.words_scanned |= words;
-    }
-
-    /// Stores the levels of the sources after the settings have changed. They are no edges, but those of bits that a scan
-    /// has read and for which the links have not run yet. Words have their new unit after the next scan.
-    pub(super) fn settle_links(&mut self) {
-        if !links::exist(SLOTS) {
-            return;
-        }
-        self.has_links = false;
-        self.linked_words = 0;
-        self.words_scanned = false;
-        for slot in 0..SLOTS {
-            let act = self.links_due & self.linked & 1 << (slot & 7) != 0;
-            self.update_links(slot, act, false);
-        }
-    }
-
-    /// Stores the levels of the sources of the links to a slot. `act` and `act_words`: a level of a bit or of a word that has
-    /// changed is an edge.
     #[inline(never)]
-    fn update_links(&mut self, slot: usize, act: bool, act_words: bool) {
-        let alone = self.comm_watchdog.has_expired();
-        let now = self.state.millis();
-        let mut levels = self.levels.get(slot).copied().unwrap_or_default();
-        for index in 0..OF_A_SLOT {
-            let link = self.config.link(slot, index);
-            self.has_links |= link.source().is_some();
-            let before = levels >> index & 1 != 0;
-            let (level, is_word) = self.level_of(link, before);
-            if level == before {
-                continue;
-            }
-            levels ^= 1 << index;
-            let (output, other) = (index % CHANNELS, index ^ CHANNELS);
-            let second = self.config.link(slot, other);
-            let wanted = second.is_awake(alone) && second.wants(levels >> other & 1 != 0);
-            let act = if is_word { act_words } else { act };
-            if act
-                && link.is_awake(alone)
-                && let Some(port) = self.points.ports().get(slot)
-                && let Some(act) = link.at_edge(level, port.channels.bit(output), wanted)
+    fn run_slot(&mut self, slot: usize, now: u32) {
+        let Self {
+            config,
+            points,
+            linking,
+            ..
+        } = self;
+        let Linking {
+            outputs,
+            sources,
+            alone,
+            look,
+            ..
+        } = linking;
+        let Some(outputs) = outputs.get_mut(slot) else {
+            return;
+        };
+        for index in bits(outputs.levels()) {
+            let link = config.link(slot, index);
+            let safe = points.ports().get(slot).and_then(|port| port.safe_bit(index % CHANNELS));
+            let place = link.source().and_then(|point| points.index_of(point));
+            if let Some((of, channel)) = place
+                && let (Some(port), Some(sources)) = (points.ports().get(of), sources.get(of))
             {
-                self.points.act(slot, output, act, now);
+                outputs.look(index, link, source(port, sources, channel), safe, *look);
             }
         }
-        if let Some(own) = self.levels.get_mut(slot) {
-            *own = levels;
+        outputs.hold();
+        for index in bits(outputs.acting_edges(*alone)) {
+            let link = config.link(slot, index);
+            let place = link.source().and_then(|point| points.index_of(point));
+            if let Some((of, from)) = place
+                && sources.get(of).is_some_and(|sources| sources.has_edge(from))
+                && let (Some(port), Some(of)) = (points.ports().get(slot), points.ports().get(of))
+                && let output = port.channels().bit(index % CHANNELS)
+                && let Some(act) = link.at_edge(of.channels().bit(from), output)
+            {
+                points.act(slot, index % CHANNELS, act, now);
+            }
+        }
+        let held = outputs.held();
+        if held != 0 {
+            points.hold(slot, held, outputs.held_on());
         }
     }
 
-    /// Returns the level of the source of a link, and whether it is a word. `before` is its level before, which a link
-    /// without source keeps.
-    fn level_of(&self, link: &Link, before: bool) -> (bool, bool) {
-        let source = link.source().and_then(|point| self.points.place_of(point));
-        match source.map(|(port, channel)| (port.kind(channel), port.channels(), channel)) {
-            Some((Kind::BitInput, channels, channel)) => (channels.bit(channel), false),
-            Some((Kind::WordInput, channels, channel)) => {
-                (link.level_of(channels.word(channel), before), true)
-            }
-            _ => (before, false),
+    /// Returns the channels of a slot for the scan to drive. Outputs that links hold have what the links want, whatever
+    /// a request has written since the links ran.
+    #[must_use]
+    pub fn driven(&self, slot: usize) -> Channels {
+        let mut channels = Channels::new();
+        if let Some(port) = self.points.ports().get(slot) {
+            channels = *port.channels();
+        }
+        if links::exist(SLOTS)
+            && let Some(outputs) = self.linking.outputs.get(slot)
+        {
+            channels.set_bits(outputs.held(), outputs.held_on());
+        }
+        channels
+    }
+
+    /// Ends the hold of the links that act only while there is no master: a master has written the outputs of a span.
+    #[inline(always)]
+    pub(super) fn end_holds(&mut self, start: u16, count: u16) {
+        if links::exist(SLOTS) && self.linking.holding {
+            self.end_holds_now(start, count);
         }
     }
+
+    #[cold]
+    #[inline(never)]
+    fn end_holds_now(&mut self, start: u16, count: u16) {
+        for point in start..start.wrapping_add(count) {
+            if let Some((slot, channel)) = self.points.index_of(point)
+                && let Some(outputs) = self.linking.outputs.get_mut(slot)
+            {
+                outputs.end_hold(1 << channel);
+            }
+        }
+    }
+}
+
+/// Makes a source begin again, after a power-on or a change of its settings, or after any other reset.
+fn begin_source(sources: &mut Sources, port: &IoPort, channel: usize, long: bool) {
+    let is_digital = port.kind(channel) == Kind::BitInput;
+    let debounce = port.setting(channel).filter(|_| is_digital);
+    let debounce = debounce.map_or(0, |setting| setting.filter);
+    let wait = if long || !is_digital { AFTER_POWER_ON_MS } else { 0 };
+    sources.begin(channel, wait + debounce);
+}
+
+/// Returns what a channel is for a level link.
+fn source(port: &IoPort, sources: &Sources, channel: usize) -> Source {
+    let channels = port.channels();
+    if !sources.has_value(channel) {
+        Source::NoValue {
+            good: sources.is_good(channel),
+        }
+    } else if port.kind(channel) == Kind::BitInput {
+        Source::Bit(channels.bit(channel))
+    } else if channels.quality(channel) == Quality::Good {
+        Source::Word(channels.word(channel))
+    } else {
+        Source::Uncertain
+    }
+}
+
+/// Returns the numbers of the bits that are set.
+fn bits(mut mask: u8) -> impl Iterator<Item = usize> {
+    core::iter::from_fn(move || {
+        let bit = mask.trailing_zeros() as usize;
+        let is_set = mask != 0;
+        mask &= mask.wrapping_sub(1);
+        is_set.then_some(bit)
+    })
 }

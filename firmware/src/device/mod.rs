@@ -45,6 +45,7 @@ use description::Description;
 pub use description::Fixed;
 use edge_log::EdgeLog;
 use events::Events;
+use linking::Linking;
 pub use points::Points;
 pub use port::IoPort;
 pub use state::{Identity, State};
@@ -65,18 +66,7 @@ pub struct Device<const SLOTS: usize> {
     description: Description,
     comm_watchdog: CommWatchdog,
     edges: EdgeLog,
-    /// The levels of the sources of the links of each slot, one bit for each link.
-    levels: [u8; SLOTS],
-    /// There is a link with a source.
-    has_links: bool,
-    /// Slots whose levels are those of a scan, one bit for each. From then on a change is an edge.
-    linked: u8,
-    /// The same for the sources that are words: the settings have not changed since.
-    linked_words: u8,
-    /// Slots whose links have not run since the last scan.
-    links_due: u8,
-    /// A scan has read words since the settings have changed.
-    words_scanned: bool,
+    linking: Linking<SLOTS>,
     events: Events<SLOTS>,
     /// A command from a request, to be executed when its reply has been sent.
     ordered: Option<Command>,
@@ -93,6 +83,9 @@ pub struct Device<const SLOTS: usize> {
     /// Revision of the configuration whose settings the points have.
     revision: u16,
 }
+
+/// Longest time between two scans, in ms, unless flash is erased, which takes 20 ms at least.
+const LONGEST_MS: u32 = 2;
 
 /// A restart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -163,12 +156,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
             description: Description::new(description, &config),
             comm_watchdog: CommWatchdog::new(),
             edges: EdgeLog::new(),
-            levels: [0; SLOTS],
-            has_links: false,
-            linked: 0,
-            linked_words: 0,
-            links_due: 0,
-            words_scanned: false,
+            linking: Linking::new(),
             events: Events::new(),
             ordered: None,
             new_unit: None,
@@ -180,7 +168,11 @@ impl<const SLOTS: usize> Device<SLOTS> {
             config,
         });
         device.configure_points();
-        device.for_each_point(|port, channel, point| port.command_raw(channel, point.start));
+        device.for_each_point(|port, channel, point| {
+            port.command_raw(channel, point.start);
+            false
+        });
+        device.begin_links(|_| 0);
         device
     }
 
@@ -189,24 +181,29 @@ impl<const SLOTS: usize> Device<SLOTS> {
     fn configure_points(&mut self) {
         self.config.compare();
         self.revision = self.config.revision();
-        self.for_each_point(IoPort::configure);
-        self.settle_links();
+        let changed = self.for_each_point(|port, channel, point| port.configure(channel, point));
+        self.set_up_links(&changed);
     }
 
-    /// Passes the settings in force of every point to `act`, with the point's port and channel.
-    fn for_each_point(&mut self, act: fn(&mut IoPort, usize, Point)) {
-        for (index, port) in self.points.ports_mut().iter_mut().enumerate() {
+    /// Passes the settings in force of every point to `act`, with the point's port and channel. Returns the channels of
+    /// each slot for which `act` returned true, channel 1 in bit 0.
+    fn for_each_point(&mut self, act: fn(&mut IoPort, usize, Point) -> bool) -> [u8; SLOTS] {
+        let mut results = [0; SLOTS];
+        let ports = self.points.ports_mut().iter_mut().zip(&mut results);
+        for (index, (port, result)) in ports.enumerate() {
             for channel in 0..CHANNELS {
                 if let Some(point) = self.config.point(index, channel) {
-                    act(port, channel, point);
+                    *result |= u8::from(act(port, channel, point)) << channel;
                 }
             }
         }
+        results
     }
 
-    /// Advances the time by `ms` milliseconds. Returns whether outputs were set to SAFE.
+    /// Advances the time by `ms` milliseconds, at the begin of a scan. When the communication watchdog expires, sets the
+    /// outputs to SAFE that no level link holds, and returns true.
     pub fn tick(&mut self, ms: u32) -> bool {
-        self.state.tick(ms);
+        let second = self.state.tick(ms);
         self.config.tick(ms);
         let timeout_ms = self.config.comm_timeout_ms();
         let tripped = self.comm_watchdog.check(self.state.millis(), timeout_ms);
@@ -215,29 +212,35 @@ impl<const SLOTS: usize> Device<SLOTS> {
         {
             self.restart.get_or_insert(Restart::Update);
         }
+        // Under the same lock, so that SAFE and links see the same state of the watchdog.
+        self.tick_links(ms, second);
         if tripped {
-            self.points.go_safe();
+            let linking = &self.linking;
+            self.points.go_safe(|slot| linking.with_level(slot));
         }
         tripped
     }
 
-    /// Stores the inputs that a scan of a slot has read. `words` is false when the settings have changed since the scan
-    /// began: then the words of the scan have the wrong unit. `late`: the scan before this one was some milliseconds ago,
-    /// because flash was erased. Call [`Self::run_links`] for all slots after the last.
+    /// Stores the inputs that a scan of a slot has read, `ms` milliseconds after the scan before. `words` is false when the
+    /// settings have changed since the scan began: then the words of the scan have the wrong unit. The next scan calls
+    /// [`Self::run_links`] for all slots after [`Self::tick`].
     // Not inlined into the scan, whose frame is large.
     #[inline(never)]
-    pub fn scanned(&mut self, slot: usize, channels: &Channels, words: bool, late: bool) {
+    pub fn scanned(&mut self, slot: usize, channels: &Channels, words: bool, ms: u32) {
         // 0 stands for an input without an edge.
         let now = self.state.millis().max(1);
-        if late {
+        if ms > LONGEST_MS {
             self.edges.set_late(now);
         }
         let first = self.points.first_of(slot);
-        self.links_are_due(words);
         let Some(port) = self.points.ports_mut().get_mut(slot) else {
             return;
         };
         let edges = port.scanned(channels, words, now);
+        self.scanned_sources(slot, edges, ms);
+        let Some(port) = self.points.ports().get(slot) else {
+            return;
+        };
         if HAS_EVENTS {
             self.events.look(slot, port, now);
         }
@@ -489,6 +492,7 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
     }
 
     fn write_bits(&mut self, span: Span, bits: Bits<'_>) {
+        self.end_holds(span.start(), span.count());
         self.points.write_bits(span, bits);
     }
 

@@ -92,9 +92,10 @@ impl<const SLOTS: usize> Points<SLOTS> {
         Some((self.ports.get_mut(index / CHANNELS)?, index % CHANNELS))
     }
 
-    /// Returns the port and the channel of a point.
-    pub(super) fn place_of(&self, point: u16) -> Option<(&IoPort, usize)> {
-        self.place(self.index(point))
+    /// Returns the slot and the channel of a point.
+    pub(super) fn index_of(&self, point: u16) -> Option<(usize, usize)> {
+        let index = self.index(point);
+        (index < SLOTS * CHANNELS).then_some((index / CHANNELS, index % CHANNELS))
     }
 
     /// Returns the status of a point, 0 to 31: good for a point that does not exist.
@@ -225,9 +226,22 @@ impl<const SLOTS: usize> Points<SLOTS> {
         }
     }
 
-    /// Sets the outputs to SAFE.
-    pub(super) fn go_safe(&mut self) {
+    /// Sets the outputs of a port that links hold, and those of them that are held on, channel 1 in bit 0.
+    pub(super) fn hold(&mut self, slot: usize, held: u8, on: u8) {
+        if let Some(port) = self.ports.get_mut(slot) {
+            port.hold(held, on);
+        }
+        for at_safe in &mut self.at_safe {
+            *at_safe &= !(u32::from(held) << ((slot * CHANNELS) & 31));
+        }
+    }
+
+    /// Sets the outputs to SAFE, but those of each slot that `but` returns, channel 1 in bit 0.
+    pub(super) fn go_safe(&mut self, but: impl Fn(usize) -> u8) {
         for index in 0..SLOTS * CHANNELS {
+            if but(index / CHANNELS) >> (index % CHANNELS) & 1 != 0 {
+                continue;
+            }
             let before = self.commanded(index);
             if let Some((port, channel)) = self.place_mut(index)
                 && port.go_safe(channel, before)

@@ -23,8 +23,10 @@ pub struct IoPort {
     pulses: [u32; CHANNELS],
     /// Uptime of the last edge of each digital input in ms; 0 without one.
     edges: [u32; CHANNELS],
-    /// Uptime in ms at which a pulse of each digital output ends; 0 without a pulse.
+    /// Uptime in ms at which the pulse of a digital output ends.
     pulse_ends: [u32; CHANNELS],
+    /// Outputs with a pulse, channel 1 in bit 0.
+    pulsing: u8,
     /// Changes of words that are events; 0 for 1/256 of the range.
     deadbands: [u16; if HAS_EVENTS { CHANNELS } else { 0 }],
     /// What was commanded last, raw, of each output that was set to SAFE since then.
@@ -47,6 +49,7 @@ impl IoPort {
             pulses: [0; CHANNELS],
             edges: [0; CHANNELS],
             pulse_ends: [0; CHANNELS],
+            pulsing: 0,
             deadbands: Default::default(),
             before_safe: [0; KEPT],
             scanned: false,
@@ -55,13 +58,14 @@ impl IoPort {
     }
 
     /// Applies the settings and SAFE of a channel. The output does not change: a commanded word is converted to the new
-    /// scale.
-    pub fn configure(&mut self, channel: usize, to: Point) {
+    /// scale. Returns whether the settings differ from those before.
+    pub fn configure(&mut self, channel: usize, to: Point) -> bool {
         let kind = self.kind(channel);
         let places = (self.settings.get_mut(channel), self.safe.get_mut(channel));
         let (Some(settings), Some(safe)) = places else {
-            return;
+            return false;
         };
+        let differs = *settings != to.settings;
         if kind == Kind::WordOutput {
             let word = self.channels.word(channel);
             let word = scale::output_rescaled(word, settings, &to.settings);
@@ -73,6 +77,7 @@ impl IoPort {
         if let Some(deadband) = self.deadbands.get_mut(channel) {
             *deadband = to.deadband;
         }
+        differs
     }
 
     /// Returns the settings that were applied last.
@@ -107,6 +112,7 @@ impl IoPort {
                 Kind::WordInput if words => {
                     self.channels.set_word(channel, scanned.word(channel));
                     self.channels.set_status(channel, scanned.status(channel));
+                    self.channels.set_quality(channel, scanned.quality(channel));
                 }
                 Kind::WordInput | Kind::None | Kind::BitOutput | Kind::WordOutput => {}
             }
@@ -122,21 +128,47 @@ impl IoPort {
     }
 
     /// Sets a digital output. This ends a pulse of the output.
-    pub(super) fn set_output(&mut self, channel: usize, value: bool) {
+    pub(super) const fn set_output(&mut self, channel: usize, value: bool) {
         self.channels.set_bit(channel, value);
-        if let Some(end) = self.pulse_ends.get_mut(channel) {
-            *end = 0;
-        }
+        self.pulsing &= !(1 << (channel & 7));
     }
 
     /// Clears the outputs whose pulse ends at the uptime `now` in ms.
     pub(super) fn end_pulses(&mut self, now: u32) {
-        for channel in 0..CHANNELS {
-            let is_over = |end: &u32| *end != 0 && now.wrapping_sub(*end).cast_signed() >= 0;
-            if self.pulse_ends.get(channel).is_some_and(is_over) {
+        if self.pulsing == 0 {
+            return;
+        }
+        for (channel, end) in self.pulse_ends.into_iter().enumerate() {
+            let is_over = now.wrapping_sub(end).cast_signed() >= 0;
+            if is_over && self.pulsing >> channel & 1 != 0 {
                 self.set_output(channel, false);
             }
         }
+    }
+
+    /// Returns the outputs with a pulse, channel 1 in bit 0.
+    #[must_use]
+    pub const fn pulsing(&self) -> u8 {
+        self.pulsing
+    }
+
+    /// Sets the digital outputs that links hold, and those of them that are held on, channel 1 in bit 0.
+    pub(super) const fn hold(&mut self, held: u8, on: u8) {
+        self.channels.set_bits(held, on);
+        self.pulsing &= !held;
+    }
+
+    /// Returns SAFE of a digital output; `None` holds it.
+    pub(super) fn safe_bit(&self, channel: usize) -> Option<bool> {
+        let safe = self.safe.get(channel).copied().flatten();
+        safe.map(|safe| safe != 0)
+    }
+
+    /// Returns the channels of this kind, channel 1 in bit 0.
+    #[must_use]
+    pub fn channels_of(&self, kind: Kind) -> u8 {
+        let of_kind = |mask, (channel, own): (usize, &Kind)| mask | u8::from(*own == kind) << channel;
+        self.kinds.iter().enumerate().fold(0, of_kind)
     }
 
     /// Does what a link does to an output at the uptime `now` in ms. Nothing happens when a write of the output would be
@@ -149,8 +181,8 @@ impl IoPort {
         if act.pulse_ms > 0
             && let Some(end) = self.pulse_ends.get_mut(channel)
         {
-            // 0 stands for no pulse.
-            *end = now.wrapping_add(act.pulse_ms).max(1);
+            *end = now.wrapping_add(act.pulse_ms);
+            self.pulsing |= 1 << (channel & 7);
         }
         true
     }
@@ -180,9 +212,10 @@ impl IoPort {
     }
 
     /// Returns what an output is commanded: 0 or 1 for a bit, 0 to 4095 raw for a word. A pulse counts as ended.
-    pub(super) fn commanded(&self, channel: usize) -> u16 {
+    #[must_use]
+    pub fn commanded(&self, channel: usize) -> u16 {
         match (self.kind(channel), self.setting(channel)) {
-            (Kind::BitOutput, _) if self.pulse_ends.get(channel) == Some(&0) => {
+            (Kind::BitOutput, _) if self.pulsing >> (channel & 7) & 1 == 0 => {
                 self.channels.bit(channel).into()
             }
             (Kind::WordOutput, Some(settings)) => {

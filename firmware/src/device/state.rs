@@ -92,14 +92,21 @@ impl State {
         }
     }
 
-    /// Advances the time by `ms` milliseconds.
-    pub const fn tick(&mut self, ms: u32) {
+    /// Advances the time by `ms` milliseconds. Returns whether a second of the uptime has begun.
+    pub const fn tick(&mut self, ms: u32) -> bool {
         self.millis = self.millis.wrapping_add(ms);
         self.part_ms = self.part_ms.saturating_add(ms);
+        let second = self.part_ms >= 1000;
         while self.part_ms >= 1000 {
             self.part_ms -= 1000;
             self.uptime_s = self.uptime_s.wrapping_add(1);
         }
+        second
+    }
+
+    /// Returns whether the start was a power-on.
+    pub(super) fn was_powered_on(&self) -> bool {
+        u16::from(self.identity.reset_cause) & at::reset_cause::POWER_ON != 0
     }
 
     /// Returns the counters of a line, to be updated.

@@ -36,7 +36,7 @@ impl Bench<4> {
         let mut page = [0xFF; 200];
         encode_page(0, outputs, &mut page).unwrap();
         let (_, record) = records(&page).next().unwrap();
-        self.device.restore(&record);
+        self.device.start_outputs(None, Some(&record));
         self
     }
 }

@@ -340,7 +340,7 @@ fn levels_at_the_start_and_of_a_new_link_are_no_edges() {
         let mut channels = channels;
         channels.set_bit(0, true);
         channels.set_word(0, 4000);
-        bench.device.scanned(port, &channels, true, false);
+        bench.device.scanned(port, &channels, true, 1);
     }
     (0..4).for_each(|slot| bench.device.run_links(slot));
     let bits = |bench: &mut Bench<4>| bench.ask(&[1, 0, OUTPUT as u8, 0, 4])[2];
@@ -406,7 +406,7 @@ fn edge_of_a_scan_reaches_a_link_although_a_setting_is_written_before_the_links_
     // As `Scanning::run` does it: the inputs under one lock, then the links under others. A request is served in between.
     let mut channels = *bench.device.points.ports()[0].channels();
     channels.set_bit(0, true);
-    bench.device.scanned(0, &channels, true, false);
+    bench.device.scanned(0, &channels, true, 1);
     bench.write(at::RESPONSE_DELAY, &[1]).unwrap();
     (0..4).for_each(|slot| bench.device.run_links(slot));
     assert!(bench.output(), "the edge was lost");
@@ -423,7 +423,7 @@ fn change_of_the_scale_of_an_analog_source_is_no_edge() {
     channels.set_word(0, 4884);
     // The scan under way when the setting was written, then the first one with the new scale.
     for words in [false, true] {
-        bench.device.scanned(2, &channels, words, false);
+        bench.device.scanned(2, &channels, words, 1);
         (0..4).for_each(|slot| bench.device.run_links(slot));
     }
     assert!(!bench.output(), "the input has not changed");

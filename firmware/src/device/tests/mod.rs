@@ -125,7 +125,7 @@ impl<const SLOTS: usize> Bench<SLOTS> {
     fn scan_port(&mut self, index: usize, set: impl FnOnce(&mut modio_drivers::Channels)) {
         let mut channels = *self.device.points.ports()[index].channels();
         set(&mut channels);
-        self.device.scanned(index, &channels, true, false);
+        self.device.scanned(index, &channels, true, 1);
         (0..SLOTS).for_each(|slot| self.device.run_links(slot));
     }
 }

@@ -1,20 +1,27 @@
 //! Links: inputs that switch digital outputs without a master.
 //!
-//! Everything happens at an edge of the input, so a master, SAFE and links can share an output: the last one wins. For an
-//! analog input the edges are the crossings of two thresholds:
+//! A level link (follow, invert) holds its output at what its source wants. An edge link (the others) acts at an edge of
+//! its source and at nothing else. An analog source has level links only:
 //!
 //! ```text
-//!   word   ______                  on:  the word was above HIGH last
-//!   HIGH --/------\---------       off: the word was below LOW last
+//!   word   ______                  above HIGH: on with follow, off with invert
+//!   HIGH --/------\---------       below LOW: off with follow, on with invert
 //!         /        \     /\
-//!   LOW -/----------\---/--\       between them nothing changes
+//!   LOW -/----------\---/--\       between them: what it wanted before
 //!   _____|           |_/
-//!       edge        edge
 //! ```
+//!
+//! [`Sources`] says when an input has a value, [`Outputs`] what the links to the outputs of a slot do with it.
+
+mod outputs;
+mod sources;
 
 use modio_drivers::{CHANNELS, Kind};
 use register_map::codes::LinkAction;
 use register_map::links::{EACH, NO_SOURCE, WORDS};
+
+pub use outputs::{AFTER_A_WRITE_MS, Outputs, Source};
+pub use sources::{AFTER_A_FAULT_MS, AFTER_POWER_ON_MS, Sources};
 
 /// Number of links of a slot: the first links of its points, then the second ones.
 pub const OF_A_SLOT: usize = CHANNELS * EACH as usize;
@@ -71,35 +78,54 @@ impl Link {
         let action = self.0[1] & !LinkAction::NoneAlone.code();
         let [low, high] = self.thresholds();
         let last = match source {
-            Kind::BitInput => LinkAction::Reset,
+            Kind::BitInput => LinkAction::Change,
             Kind::WordInput if low <= high => LinkAction::Invert,
-            _ if self.source().is_none() => LinkAction::Reset,
+            _ if self.source().is_none() => LinkAction::Change,
             _ => return false,
         };
         action <= last.code() && (action != LinkAction::Pulse.code() || self.0[2] > 0)
     }
 
-    /// Returns whether the link acts. `alone`: the communication watchdog has expired.
-    #[must_use]
-    pub const fn is_awake(&self, alone: bool) -> bool {
-        self.0[1] >> 8 == 0 || alone
+    /// Returns whether the link does anything.
+    fn has_action(&self) -> bool {
+        self.action() != LinkAction::None
     }
 
-    /// Returns the level of an analog input with this word. `before` is its level before.
+    /// Returns whether the link follows or inverts its source.
+    fn is_level(&self) -> bool {
+        matches!(self.action(), LinkAction::Follow | LinkAction::Invert)
+    }
+
+    /// Returns whether the link inverts its source.
+    fn inverts(&self) -> bool {
+        self.action() == LinkAction::Invert
+    }
+
+    /// Returns whether the link acts only while the communication watchdog has expired.
+    const fn is_for_alone(&self) -> bool {
+        self.0[1] >> 8 != 0
+    }
+
+    /// Returns the level of an analog input with this word; `None` between the thresholds.
     #[must_use]
-    pub fn level_of(&self, word: u16, before: bool) -> bool {
+    pub fn level_of(&self, word: u16) -> Option<bool> {
         let [low, high] = self.thresholds();
         let word = word.cast_signed();
-        word > high || before && word >= low
+        if word > high {
+            Some(true)
+        } else if word < low {
+            Some(false)
+        } else {
+            None
+        }
     }
 
-    /// Returns what the link does when the level of its input has changed. `output` is the value of the output, `other`
-    /// whether its other link wants it on.
+    /// Returns what an edge link does at an edge of its source to this level. `output` is the value of the output.
     #[must_use]
-    pub fn at_edge(&self, level: bool, output: bool, other: bool) -> Option<Act> {
+    pub fn at_edge(&self, level: bool, output: bool) -> Option<Act> {
         let mut pulse_ms = 0;
         let value = match self.action() {
-            LinkAction::Follow | LinkAction::Invert => self.wants(level) || other,
+            LinkAction::Change => !output,
             LinkAction::Toggle if level => !output,
             LinkAction::Pulse if level => {
                 pulse_ms = u32::from(self.0[2]) * 100;
@@ -110,16 +136,6 @@ impl Link {
             _ => return None,
         };
         Some(Act { value, pulse_ms })
-    }
-
-    /// Returns whether a link that follows its input wants the output on, for this level of the input.
-    #[must_use]
-    pub fn wants(&self, level: bool) -> bool {
-        match self.action() {
-            LinkAction::Follow => level,
-            LinkAction::Invert => !level,
-            _ => false,
-        }
     }
 }
 
@@ -136,51 +152,29 @@ mod tests {
 
     #[test]
     fn edges_do_what_the_action_says() {
-        use LinkAction::{Follow, Invert, None, Pulse, Reset, Set, Toggle};
+        use LinkAction::{Change, Follow, Invert, None, Pulse, Reset, Set, Toggle};
         let set = |value| Some(Act { value, pulse_ms: 0 });
+        const NOTHING: [Option<Act>; 2] = [Option::None; 2];
         // With the output off and on.
         for (action, rising, falling) in [
-            (None, [Option::None; 2], [Option::None; 2]),
-            (Follow, [set(true); 2], [set(false); 2]),
-            (Invert, [set(false); 2], [set(true); 2]),
-            (Toggle, [set(true), set(false)], [Option::None; 2]),
-            (Set, [set(true); 2], [Option::None; 2]),
-            (Reset, [set(false); 2], [Option::None; 2]),
+            (None, NOTHING, NOTHING),
+            (Follow, NOTHING, NOTHING),
+            (Invert, NOTHING, NOTHING),
+            (Toggle, [set(true), set(false)], NOTHING),
+            (Change, [set(true), set(false)], [set(true), set(false)]),
+            (Set, [set(true); 2], NOTHING),
+            (Reset, [set(false); 2], NOTHING),
         ] {
             let link = link(action);
-            let acts = |level| [false, true].map(|output| link.at_edge(level, output, false));
+            let acts = |level| [false, true].map(|output| link.at_edge(level, output));
             assert_eq!((acts(true), acts(false)), (rising, falling), "{action:?}");
-            let follows = [Follow, Invert].contains(&action);
-            for level in [false, true] {
-                let with_other = link.at_edge(level, false, true);
-                assert_eq!(
-                    with_other == set(true),
-                    follows || level && rising[0] == set(true)
-                );
-            }
         }
         for time in [1, 0xFFFF] {
             let link = Link([3, Pulse.code(), time, 0]);
             let pulse_ms = u32::from(time) * 100;
             let value = true;
-            assert_eq!(
-                link.at_edge(true, true, false),
-                Some(Act { value, pulse_ms })
-            );
-            assert_eq!(link.at_edge(false, true, false), Option::None);
-        }
-    }
-
-    #[test]
-    fn a_link_wants_its_output_on_only_if_it_follows() {
-        for action in LinkAction::ALL.iter().copied() {
-            let wants = [false, true].map(|level| link(action).wants(level));
-            let expected = match action {
-                LinkAction::Follow | LinkAction::FollowAlone => [false, true],
-                LinkAction::Invert | LinkAction::InvertAlone => [true, false],
-                _ => [false; 2],
-            };
-            assert_eq!(wants, expected, "{action:?}");
+            assert_eq!(link.at_edge(true, true), Some(Act { value, pulse_ms }));
+            assert_eq!(link.at_edge(false, true), Option::None);
         }
     }
 
@@ -188,13 +182,11 @@ mod tests {
     fn when_is_the_high_byte_of_the_action() {
         for action in LinkAction::ALL {
             let link = link(*action);
-            assert!(link.is_awake(true));
-            assert_eq!(link.is_awake(false), action.code() < 0x100);
+            assert_eq!(link.is_for_alone(), action.code() >= 0x100);
             let always = Link([3, action.code() & 7, 1, 0]);
-            assert_eq!(
-                link.at_edge(true, false, false),
-                always.at_edge(true, false, false)
-            );
+            assert_eq!(link.at_edge(true, false), always.at_edge(true, false));
+            let levels = [LinkAction::Follow, LinkAction::Invert];
+            assert_eq!(link.is_level(), levels.contains(&always.action()));
         }
     }
 
@@ -219,16 +211,13 @@ mod tests {
     }
 
     #[test]
-    fn level_of_an_analog_input_has_a_hysteresis() {
+    fn level_of_an_analog_input_is_unknown_between_the_thresholds() {
         let link = Link([3, 1, 20, 10]);
-        let mut level = false;
-        let words = [15, 20, 21, 20, 10, 9, 10, 20, 30, 0xFFFF];
-        let levels = words.map(|word| {
-            level = link.level_of(word, level);
-            u8::from(level)
-        });
-        assert_eq!(levels, [0, 0, 1, 1, 1, 0, 0, 0, 1, 0], "-1 is below 10");
+        let words = [9, 10, 20, 21, 0xFFFF];
+        let levels = words.map(|word| link.level_of(word));
+        let (on, off) = (Some(true), Some(false));
+        assert_eq!(levels, [off, None, None, on, off], "-1 is below 10");
         let frost = Link([3, 1, 0, 0xFFF6]);
-        assert!(frost.level_of(0xFFF6, true) && !frost.level_of(0xFFF5, true));
+        assert_eq!([0xFFF6, 0xFFF5].map(|word| frost.level_of(word)), [None, off]);
     }
 }
