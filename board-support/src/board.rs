@@ -141,7 +141,7 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
         (take_reset_cause(&rcc), false)
     };
     let watchdog = Watchdog::start(device.IWDG, &device.DBGMCU);
-    let kept = kept::at_start(reset_cause & (WATCHDOG | POWER_ON) == WATCHDOG);
+    let (kept, powered_s) = kept::at_start(reset_cause & (WATCHDOG | POWER_ON) == WATCHDOG);
     let faults = kept.record();
     let crystal = faults.crystal_faults < CRYSTAL_FAULTS;
     let clock = clock::start(&rcc, &device.FLASH, crystal);
@@ -183,7 +183,7 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
         chosen: kept.is_chosen(),
         development,
         saves_left: kept.saves(),
-        powered_s: kept.started(),
+        powered_s,
         unique_id: unique_id::read(),
         sampler: Sampler::new(device.ADC1),
         dacs: DacBus::new(device.I2C1, clock),

@@ -94,12 +94,12 @@ mod tests {
     #[test]
     fn budget_is_kept_over_a_restart_and_small_after_a_power_on() {
         let mut now = u32::MAX - 5_000;
-        for (kept, expected) in [(0, 0), (7, 7), (80, 80), (81, 1), (255, 1)] {
+        for (kept, expected) in [(0, 0), (7, 7), (80, 80), (81, 4), (255, 4)] {
             assert_eq!(Schedule::new(kept).left(), expected);
         }
         let mut schedule = Schedule::new(u8::MAX);
         schedule.compared_ms = now;
-        assert_eq!(records(&mut schedule, &mut now, 1_079), 1, "over the wrap");
+        assert_eq!(records(&mut schedule, &mut now, 1_079), 4, "over the wrap");
         assert_eq!(records(&mut schedule, &mut now, 1_080), 1);
     }
 }

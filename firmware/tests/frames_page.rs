@@ -54,7 +54,7 @@ impl Unit {
         if line.contains("Input 1 has 5 V") {
             inputs.set_word(0, 0x0800);
         }
-        device.scanned(0, &inputs, true, 1);
+        device.scanned(0, &inputs, &[None; 4], true, 1);
         if line.contains("does not answer") {
             device.points.ports_mut()[0].set_failing(0b1111);
         }

@@ -4,7 +4,7 @@ use register_map::limits::LOW_PASS_DEFAULT;
 
 use crate::low_pass::LowPass;
 use crate::{
-    CHANNELS, ChannelSettings, ChannelStatus, Channels, Code, Kind, ModuleError, Quality, Scale,
+    CHANNELS, ChannelSettings, ChannelStatus, Channels, Code, Kind, ModuleError, Scale,
     input_status, scale::Measured,
 };
 
@@ -14,9 +14,6 @@ pub type Codes = [Option<u16>; CHANNELS];
 
 /// Number of scans in a row without a code after which a line counts as failed.
 pub const STALLED_SCANS: u8 = 10;
-
-/// Number of implausible codes that make the quality of an input bad, and of plausible ones in a row that make it good.
-pub const QUALITY_SCANS: u8 = 10;
 
 /// Analog inputs on the slot's first lines.
 #[derive(Debug)]
@@ -68,10 +65,6 @@ struct Input {
     status: ChannelStatus,
     /// Number of scans since the last code.
     stalled: u8,
-    /// Number of implausible codes since the quality was good, at most [`QUALITY_SCANS`].
-    implausible: u8,
-    /// Number of plausible codes since the last implausible one.
-    plausible: u8,
 }
 
 impl Input {
@@ -80,18 +73,12 @@ impl Input {
         filter: LowPass::new(LOW_PASS_DEFAULT),
         status: ChannelStatus::Good,
         stalled: 0,
-        implausible: 0,
-        plausible: 0,
     };
 
     fn configure(&mut self, settings: &ChannelSettings) {
         if settings.signal != self.settings.signal {
             // The status belongs to the previous range; do not use it for this one, not even for the hysteresis.
             self.status = ChannelStatus::Good;
-        }
-        if *settings != self.settings {
-            // So do the codes that were implausible.
-            self.implausible = 0;
         }
         self.filter.set_n(settings.filter);
         self.settings = *settings;
@@ -100,37 +87,13 @@ impl Input {
     fn sample(&mut self, code: Option<u16>) {
         if let Some(code) = code {
             self.stalled = 0;
-            let code = Code::new(code);
-            self.judge(code);
-            self.filter.sample(code);
+            self.filter.sample(Code::new(code));
             return;
         }
         self.stalled = self.stalled.saturating_add(1);
         if self.stalled >= STALLED_SCANS {
             // The channel keeps its word, and the filter restarts when the line works again.
             self.filter.reset();
-        }
-    }
-
-    /// Counts implausible codes. They need not follow each other: of a wire that opens and closes many times a second, a
-    /// part of the codes is plausible.
-    fn judge(&mut self, code: Code) {
-        if input_status::is_implausible(code, &self.settings) {
-            self.implausible = (self.implausible + 1).min(QUALITY_SCANS);
-            self.plausible = 0;
-        } else if self.implausible > 0 {
-            self.plausible += 1;
-            if self.plausible >= QUALITY_SCANS {
-                self.implausible = 0;
-            }
-        }
-    }
-
-    const fn quality(&self) -> Quality {
-        match self.implausible {
-            0 => Quality::Good,
-            QUALITY_SCANS.. => Quality::Bad,
-            _ => Quality::Uncertain,
         }
     }
 
@@ -147,6 +110,5 @@ impl Input {
             channels.set_word(channel, word);
             channels.set_status(channel, self.status);
         }
-        channels.set_quality(channel, self.quality());
     }
 }

@@ -12,25 +12,6 @@ pub struct Channels {
     bits: u8,
     words: [u16; CHANNELS],
     status: [ChannelStatus; CHANNELS],
-    /// Analog inputs whose code was implausible not long ago, channel 1 in bit 0.
-    uncertain: u8,
-    /// Analog inputs whose code has been implausible for ten scans.
-    bad: u8,
-}
-
-/// Whether an analog input's signal can be trusted, judged by its codes before the low-pass, which hides a loose wire.
-///
-/// A code is implausible when it lies under the range, or shows an open or a short circuit. One that is over the range is
-/// plausible.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Quality {
-    /// No code was implausible for ten scans.
-    #[default]
-    Good,
-    /// Fewer than ten codes have been implausible since then.
-    Uncertain,
-    /// Ten codes have been implausible, and since then no ten in a row were plausible.
-    Bad,
 }
 
 impl Channels {
@@ -41,8 +22,6 @@ impl Channels {
             bits: 0,
             words: [0; CHANNELS],
             status: [ChannelStatus::Good; CHANNELS],
-            uncertain: 0,
-            bad: 0,
         }
     }
 
@@ -109,36 +88,6 @@ impl Channels {
             self.status[channel] = status;
         }
     }
-
-    /// Returns the quality of a channel, 0 to 3. Digital channels and outputs are good.
-    #[must_use]
-    pub const fn quality(&self, channel: usize) -> Quality {
-        if self.bad >> (channel & 7) & 1 != 0 {
-            Quality::Bad
-        } else if self.uncertain >> (channel & 7) & 1 != 0 {
-            Quality::Uncertain
-        } else {
-            Quality::Good
-        }
-    }
-
-    /// Returns the channels whose quality is bad, channel 1 in bit 0.
-    #[must_use]
-    pub const fn bad(&self) -> u8 {
-        self.bad
-    }
-
-    /// Sets the quality of a channel, 0 to 3.
-    pub const fn set_quality(&mut self, channel: usize, quality: Quality) {
-        let mask = 1 << (channel & 7);
-        self.uncertain &= !mask;
-        self.bad &= !mask;
-        match quality {
-            Quality::Good => {}
-            Quality::Uncertain => self.uncertain |= mask,
-            Quality::Bad => self.bad |= mask,
-        }
-    }
 }
 
 #[cfg(test)]
@@ -173,20 +122,6 @@ mod tests {
             [0, 1, 2, 3, 4].map(|c| channels.status(c).code()),
             [0, 3, 0, 0, 0]
         );
-    }
-
-    #[test]
-    fn quality_of_each_channel_is_independent() {
-        let mut channels = Channels::new();
-        channels.set_quality(1, Quality::Uncertain);
-        channels.set_quality(2, Quality::Uncertain);
-        channels.set_quality(2, Quality::Bad);
-        channels.set_quality(3, Quality::Bad);
-        assert_eq!(channels.bad(), 0b1100);
-        channels.set_quality(3, Quality::Good);
-        let qualities = [0, 1, 2, 3].map(|channel| channels.quality(channel));
-        use Quality::{Bad, Good, Uncertain};
-        assert_eq!(qualities, [Good, Uncertain, Bad, Good]);
     }
 
     #[test]

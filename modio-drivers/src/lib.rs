@@ -24,9 +24,9 @@ mod settings;
 
 pub use ai2ao2::Ai2Ao2;
 pub use ai4::Ai4;
-pub use analog_inputs::{Codes, QUALITY_SCANS, STALLED_SCANS};
+pub use analog_inputs::{Codes, STALLED_SCANS};
 pub use ao4::Ao4;
-pub use channels::{CHANNELS, Channels, Quality};
+pub use channels::{CHANNELS, Channels};
 pub use code::Code;
 pub use dac::{DacLink, DacWorker};
 pub use di4::Di4;

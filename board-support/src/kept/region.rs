@@ -8,17 +8,21 @@ use core::{
     array,
     cell::UnsafeCell,
     ptr,
-    sync::atomic::{AtomicU8, Ordering},
+    sync::atomic::{AtomicU8, AtomicU32, Ordering},
 };
 
 use super::{
-    COPY, MARKS, PULSES, UPTIME, WORDS, live,
+    COPY, HELD, MARKS, MODULES, OUTPUTS, POINTS, PULSES, UPTIME, WORDS, live,
     sealed::{
         self, AS_255, ASKED, CAUSE, CHOSEN, DEVELOPMENT, DIP, FLAGS, FRESH, HAS_DIP, RECORDS,
-        SAVES, STARTED, Sealed, UNSEEN,
+        SAVES, Sealed, UNSEEN,
     },
 };
 use crate::fault::{ENDED, Fault, Kind, TASKS};
+
+/// The seconds from power-on to this start, or before it to the one before. The region has the latter until the outputs
+/// are this run's.
+static STARTED_S: AtomicU32 = AtomicU32::new(0);
 
 #[repr(transparent)]
 struct Region(UnsafeCell<[u32; WORDS]>);
@@ -71,7 +75,8 @@ pub(super) fn update(fault: Option<&Fault>, word: usize, mask: u32, bits: u32) {
         } else {
             0
         };
-        sealed.note(fault, live(UPTIME), missing);
+        let uptime = live(UPTIME).wrapping_sub(STARTED_S.load(Ordering::Relaxed));
+        sealed.note(fault, uptime, missing);
     }
     sealed.set(word, mask, bits);
     sealed.store(in_force.unwrap_or_default(), write);
@@ -83,20 +88,23 @@ pub(crate) fn forget() {
     write(COPY, 0);
 }
 
-/// Prepares the region for this start, and returns the content of the sealed part. A reset by the watchdog is noted
-/// when nothing else was. The board calls this once at every start, before it starts the crystal, because the content
+/// Prepares the region for this start, and returns the content of the sealed part and the seconds since power-on. A reset
+/// by the watchdog is noted when nothing else was. The board calls this once at every start, before it starts the crystal, because the content
 /// has the number of crystal failures.
-pub(crate) fn at_start(by_watchdog: bool) -> Sealed {
+pub(crate) fn at_start(by_watchdog: bool) -> (Sealed, u32) {
     let fault = Fault {
         kind: Kind::Watchdog,
         ..Fault::default()
     };
+    // The fault was one of the run before.
+    STARTED_S.store(read(sealed::STARTED), Ordering::Relaxed);
     update(by_watchdog.then_some(&fault), FLAGS, FRESH | ASKED, 0);
-    update(None, STARTED, u32::MAX, live(UPTIME));
+    let started = live(UPTIME);
+    STARTED_S.store(started, Ordering::Relaxed);
     let marks = marks().iter();
     marks.for_each(|mark| mark.store(0, Ordering::Relaxed));
     // Both copies are valid now.
-    Sealed::copy(0, read)
+    (Sealed::copy(0, read), started)
 }
 
 /// Returns the reset flags that the loader kept, once, and whether it trusts the development key.
@@ -189,6 +197,41 @@ pub fn keep_pulses(slot: usize, pulses: &[u32; 4]) {
     for (pair, pulses) in pulses.iter().enumerate() {
         set_live(pulses_of(slot) + 2 * pair, *pulses);
     }
+}
+
+/// Returns the half-word of a point, 0 to 31.
+fn half_word(point: usize) -> *mut u16 {
+    // SAFETY: the half-words lie in words of the region. The low half of a word is the first one.
+    unsafe { word(OUTPUTS).cast::<u16>().add(point % POINTS) }
+}
+
+/// Returns what the outputs had at the reset, before the first [`keep_output`]: the half-word of each point, the modules
+/// that were in force, and the outputs that a link held. `None` after a power-on, and after an image that does not keep
+/// outputs.
+#[must_use]
+pub fn outputs() -> Option<([u16; POINTS], u32, u32)> {
+    // SAFETY: a half-word of RAM, which may hold any value. Volatile, because the value may be older than this start.
+    let values = array::from_fn(|point| unsafe { ptr::read_volatile(half_word(point)) });
+    let valid = Sealed::copy(0, read).has_outputs();
+    valid.then(|| (values, read(MODULES), read(HELD)))
+}
+
+/// Keeps the half-word of an output, 0 to 31. For the scan, after every change.
+pub fn keep_output(point: usize, value: u16) {
+    // SAFETY: a half-word of RAM to which no reference exists.
+    unsafe { ptr::write_volatile(half_word(point), value) }
+}
+
+/// Keeps which outputs a link holds. For the scan, after every change.
+pub fn keep_held(outputs: u32) {
+    write(HELD, outputs);
+}
+
+/// Makes the outputs those of this run, with these modules in force. For the start, after all half-words have been kept.
+pub fn keep_outputs(modules: u32) {
+    write(MODULES, modules);
+    let started = STARTED_S.load(Ordering::Relaxed);
+    update(None, sealed::STARTED, u32::MAX, started);
 }
 
 /// Returns the marks of the tasks, all 0 after the start. After a watchdog reset the next start reports every task

@@ -24,6 +24,9 @@ pub(super) const STARTED: usize = 9;
 #[cfg(target_os = "none")]
 pub(super) const CAUSE: usize = 10;
 
+/// Word of the complement of [`STARTED`], of an image that keeps outputs.
+pub(super) const OWNER: usize = 11;
+
 /// SW01.
 pub(super) const DIP: u32 = 0xFF;
 /// SW01 has been read.
@@ -101,15 +104,18 @@ impl Sealed {
         }
     }
 
-    /// Replaces the bits of `mask` in a word.
+    /// Replaces the bits of `mask` in a word. OWNER follows STARTED.
     pub(super) const fn set(&mut self, word: usize, mask: u32, bits: u32) {
-        let word = &mut self.0[word % COPY];
-        *word = *word & !mask | bits;
+        let value = self.0[word % COPY] & !mask | bits;
+        self.0[word % COPY] = value;
+        if word == STARTED {
+            self.0[OWNER] = !value;
+        }
     }
 
-    /// Notes a fault at this number of seconds since power-on. Only the first fault since the start counts, because a
+    /// Notes a fault at this number of seconds since the start. Only the first fault since the start counts, because a
     /// fault in a fault handler is a consequence of it.
-    pub(super) fn note(&mut self, fault: &Fault, seconds: u32, missing: u16) {
+    pub(super) fn note(&mut self, fault: &Fault, uptime: u32, missing: u16) {
         let words = &mut self.0;
         if words[FLAGS] & FRESH == 0 {
             words[FLAGS] |= FRESH;
@@ -119,7 +125,7 @@ impl Sealed {
             let count = (words[COUNT] as u16).saturating_add(1);
             words[COUNT] = u32::from(missing) << 16 | u32::from(count);
             words[PLACE..UPTIME].copy_from_slice(&fault.place);
-            words[UPTIME] = seconds.wrapping_sub(words[STARTED]);
+            words[UPTIME] = uptime;
         }
     }
 
@@ -162,9 +168,9 @@ impl Sealed {
         (!self.0[FLAGS] >> 16) as u8
     }
 
-    /// Returns the seconds from power-on to the last start.
-    pub(crate) const fn started(&self) -> u32 {
-        self.0[STARTED]
+    /// Returns whether the outputs of the run before are valid.
+    pub(super) const fn has_outputs(&self) -> bool {
+        self.0[OWNER] == !self.0[STARTED]
     }
 }
 
@@ -233,7 +239,7 @@ mod tests {
         let noise = [0xA5A5_5A5A; 2 * COPY];
         *update(&noise, |sealed| {
             sealed.set(STARTED, 0, 1_000);
-            sealed.note(&HARD_FAULT, 1_077, 0);
+            sealed.note(&HARD_FAULT, 77, 0);
             sealed.set(FLAGS, DIP | SAVES, HAS_DIP | 17 | saves(9));
         })
         .last()
@@ -251,7 +257,7 @@ mod tests {
             // The update of the next start may be interrupted as well.
             for second in update(first, |sealed| sealed.set(STARTED, u32::MAX, 2_000)) {
                 let now = find(&second).expect("a copy is valid");
-                assert!([1_000, 2_000].contains(&now.started()));
+                assert!([1_000, 2_000].contains(&now.0[STARTED]));
                 assert_eq!(now.saves(), between.saves());
                 assert_eq!((now.record(), now.dip()), (old.record(), Some(17)));
             }
@@ -262,23 +268,22 @@ mod tests {
     }
 
     /// Begins a start.
-    fn start(sealed: &mut Sealed, seconds: u32) {
+    fn start(sealed: &mut Sealed) {
         sealed.set(FLAGS, FRESH, 0);
-        sealed.set(STARTED, u32::MAX, seconds);
     }
 
     #[test]
     fn first_fault_since_the_start_is_kept_with_the_uptime_and_counted_once() {
         let mut sealed = Sealed::after_power_on();
-        start(&mut sealed, 1_000);
+        start(&mut sealed);
         for kind in [Kind::HardFault, Kind::Watchdog] {
-            sealed.note(&Fault { kind, ..HARD_FAULT }, 1_077, 0b101);
+            sealed.note(&Fault { kind, ..HARD_FAULT }, 77, 0b101);
         }
         let record = sealed.record();
         assert_eq!((record.kind, record.place), (2, HARD_FAULT.place));
         let numbers = (record.count, record.uptime, record.missing);
         assert_eq!(numbers, (1, 77, 0b101));
-        start(&mut sealed, 1_080);
+        start(&mut sealed);
         assert_eq!(sealed.record(), record);
     }
 
@@ -287,7 +292,7 @@ mod tests {
         let mut sealed = Sealed::after_power_on();
         let crystal_faults = |sealed: &mut Sealed, kind| {
             sealed.note(&Fault { kind, ..HARD_FAULT }, 0, 0);
-            start(sealed, 0);
+            start(sealed);
             sealed.record().crystal_faults
         };
         let kinds = [Kind::Crystal, Kind::Panic, Kind::Crystal];
@@ -329,6 +334,22 @@ mod tests {
         sealed.set(FLAGS, SAVES, saves(20));
         assert_eq!((sealed.saves(), records_of(sealed.0[FLAGS])), (20, 7));
         assert_eq!(sealed.dip(), Some(17));
+    }
+
+    #[test]
+    fn outputs_are_those_of_the_run_before_only_if_it_wrote_both_words_for_them() {
+        assert!(!Sealed::after_power_on().has_outputs());
+        let own = |sealed: &mut Sealed, started| sealed.set(STARTED, u32::MAX, started);
+        let before = *update(&in_service(), |sealed| own(sealed, 1_000))
+            .last()
+            .unwrap();
+        // A reset after any write of the next run's update leaves the words of one run.
+        for region in update(&before, |sealed| own(sealed, 2_000)) {
+            assert!(find(&region).unwrap().has_outputs());
+        }
+        // An older image does not know OWNER.
+        let older = update(&before, |sealed| sealed.0[STARTED] = 2_000);
+        assert!(!find(older.last().unwrap()).unwrap().has_outputs());
     }
 
     #[test]

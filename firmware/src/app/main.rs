@@ -30,6 +30,7 @@ mod clock;
 mod every;
 mod fault_record;
 mod installed;
+mod keeping;
 mod line;
 mod log;
 mod persistence;

@@ -3,7 +3,7 @@
 use board_support::{Sampler, boards::SLOTS, device::interrupt, kept};
 use firmware::{alive, device::IoPort, leds::TICK_MS};
 use heapless::spsc::Producer;
-use modio_drivers::{Channels, DacLink, ModuleError};
+use modio_drivers::{CHANNELS, Channels, DacLink, ModuleError};
 use register_map::links;
 use rtic::Mutex;
 
@@ -12,6 +12,7 @@ use crate::{
     clock,
     every::Every,
     installed::Installed,
+    keeping::Kept,
     log::Event,
     upkeep,
 };
@@ -19,9 +20,6 @@ use crate::{
 /// Scans per run of the background task, and scans per check that every other task still runs.
 const SCANS_PER_BACKGROUND: u8 = TICK_MS as u8;
 const SCANS_PER_PROOF: u8 = 16;
-/// Longest time between two scans, in ms, unless flash is erased, which takes 20 ms at least.
-const LONGEST_MS: u32 = 2;
-
 /// The modules and the state of their scans.
 pub struct Scanning {
     modules: [Installed; SLOTS],
@@ -30,6 +28,8 @@ pub struct Scanning {
     sampler: Sampler,
     /// Seconds from power-on to the start.
     powered_s: u32,
+    /// What a reset keeps of the outputs.
+    kept: Kept,
     background_beat: Every,
     proof_beat: Every,
     /// The task that was asked for its mark last.
@@ -46,12 +46,14 @@ impl Scanning {
         powered_s: u32,
     ) -> Self {
         let ports = device.points.ports();
-        for ((module, port), dac) in modules.iter_mut().zip(ports).zip(dacs) {
+        for ((module, port), dac) in modules.iter_mut().zip(ports).zip(dacs.iter_mut()) {
             module.driver().configure(port.settings());
             // If a module cannot be driven, the first scan reports it.
             let _ = module.driver().drive_outputs(port.channels(), dac);
         }
+        let kept = Kept::begin(device, dacs);
         Self {
+            kept,
             modules,
             revision: device.config.revision(),
             sampler,
@@ -71,9 +73,18 @@ impl Scanning {
         events: &mut Producer<'static, Event>,
     ) -> bool {
         let now = clock::millis();
-        let (mut channels, uptime_s, passed, tripped) = device.lock(|device| {
+        let (passed, tripped) = device.lock(|device| {
             let passed = now.wrapping_sub(device.state.millis());
-            let tripped = passed > 0 && device.tick(passed);
+            (passed, passed > 0 && device.tick(passed))
+        });
+        let beat = passed > 0;
+        if beat && links::exist(SLOTS) {
+            // Under a lock for each slot, because requests wait for it.
+            (0..SLOTS).for_each(|slot| device.lock(|device| device.run_links(slot)));
+        }
+        let mut channels = [Channels::new(); SLOTS];
+        let mut pulsing = [0; SLOTS];
+        let (uptime_s, held) = device.lock(|device| {
             let ports = device.points.ports();
             // Under the same lock as the words, because the settings define the units of the words.
             let revision = device.config.revision();
@@ -83,23 +94,30 @@ impl Scanning {
                     module.driver().configure(port.settings());
                 }
             }
-            let mut channels = [Channels::new(); SLOTS];
-            for (channels, port) in channels.iter_mut().zip(ports) {
-                *channels = *port.channels();
+            for (slot, channels) in channels.iter_mut().enumerate() {
+                *channels = device.driven(slot);
             }
-            (channels, device.state.uptime_s(), passed, tripped)
+            for (pulsing, port) in pulsing.iter_mut().zip(ports) {
+                *pulsing = port.pulsing();
+            }
+            (device.state.uptime_s(), device.held_outputs())
         });
-        let beat = passed > 0;
 
         let mut results = [Ok(()); SLOTS];
         let modules = self.modules.iter_mut().zip(&channels);
         dacs.lock(|dacs| {
-            for (((module, channels), result), dac) in modules.zip(&mut results).zip(dacs) {
+            for (((module, channels), result), dac) in
+                modules.zip(&mut results).zip(dacs.iter_mut())
+            {
                 *result = module.driver().drive_outputs(channels, dac);
             }
+            if links::exist(SLOTS) {
+                self.kept.keep(&channels, &pulsing, dacs, held);
+            }
         });
+        let mut codes = [[None; CHANNELS]; SLOTS];
         if beat {
-            let codes = self.sampler.run();
+            codes = self.sampler.run();
             let modules = self.modules.iter_mut().zip(&mut channels).zip(&codes);
             for (((module, channels), codes), result) in modules.zip(&mut results) {
                 *result =
@@ -108,17 +126,19 @@ impl Scanning {
         }
         device.lock(|device| {
             let words = self.revision == device.config.revision();
-            for (slot, (channels, result)) in channels.iter().zip(results).enumerate() {
-                if beat {
-                    device.scanned(slot, channels, words, passed > LONGEST_MS);
-                }
+            let scanned = channels.iter().zip(&codes).zip(results);
+            for (slot, ((channels, codes), result)) in scanned.enumerate() {
                 let Some(port) = device.points.ports_mut().get_mut(slot) else {
                     continue;
                 };
+                let changed = take_failures(port, result, beat);
                 if beat {
-                    kept::keep_pulses(slot, port.pulses());
+                    device.scanned(slot, channels, codes, words, passed);
+                    if let Some(port) = device.points.ports().get(slot) {
+                        kept::keep_pulses(slot, port.pulses());
+                    }
                 }
-                if take_failures(port, result, beat) {
+                if changed {
                     let number = BOARD.first_port + slot as u16;
                     let event = match result {
                         Ok(()) => Event::ModuleGood(number),
@@ -128,10 +148,6 @@ impl Scanning {
                 }
             }
         });
-        if beat && links::exist(SLOTS) {
-            // Under a lock for each slot, because requests wait for it.
-            (0..SLOTS).for_each(|slot| device.lock(|device| device.run_links(slot)));
-        }
         if tripped {
             enqueue(events, Event::CommunicationLost);
         }

@@ -11,6 +11,7 @@ use firmware::{
     HAS_EVENTS, KEEPS_OUTPUTS,
     config::{self, Config, LineConfig, RadioConfig},
     device::Identity,
+    kept_outputs::KeptOutputs,
     leds::{Leds, Trouble},
     line,
     start_up::{self, Address, RECOVERY_UNIT},
@@ -24,6 +25,7 @@ use modio_drivers::DacLink;
 use register_map::{
     codes::{Format, GapRule, Mode},
     configuration::UNIT,
+    links,
     state::{build as build_bits, reset_cause::POWER_ON},
     update::{DEVELOPMENT_KEY, Header},
 };
@@ -124,9 +126,22 @@ pub fn up(
         build: build(board.development),
     };
     let device = Device::new_in(place, config, identity, DESCRIPTION);
-    if KEEPS_OUTPUTS && let Some(outputs) = store.outputs(&pages) {
-        device.restore(&outputs);
-    }
+    let kept = if links::exist(SLOTS) {
+        kept::outputs()
+    } else {
+        None
+    };
+    let kept = kept.map(|(values, modules, held)| KeptOutputs {
+        values,
+        modules,
+        held,
+    });
+    let stored = if KEEPS_OUTPUTS {
+        store.outputs(&pages)
+    } else {
+        None
+    };
+    device.start_outputs(kept.as_ref(), stored.as_ref());
     let updating = Updating::new(&mut pages, board.crc);
     device.update = updating.update(&mut pages, board.chosen);
     for (slot, port) in device.points.ports_mut().iter_mut().enumerate() {

@@ -2,6 +2,7 @@
 
 use modio_drivers::{CHANNELS, Kind};
 use register_map::limits::RAW_MAX;
+use register_map::links;
 use register_map::record::{BITS, OUTPUTS, Record};
 
 use super::Device;
@@ -47,13 +48,16 @@ impl<const SLOTS: usize> Device<SLOTS> {
         let first = u32::from(self.config.board().first_port.wrapping_sub(1));
         let modules = (first..).zip(self.config.modules());
         modules.fold(0, |word, (port, module)| {
-            word | u32::from(module.code()) << (4 * port & 31)
+            word | u32::from(module.code()) << ((4 * port) & 31)
         })
     }
 
     /// Returns the outputs, by address, that are to have after a reset what they have now, because a link holds them.
     #[must_use]
     pub fn held_outputs(&self) -> u32 {
+        if !links::exist(SLOTS) {
+            return 0;
+        }
         (0..SLOTS).fold(0, |mask, slot| {
             mask | u32::from(self.linking.to_keep(slot)) << (self.points.first_of(slot) & 31)
         })

@@ -1,6 +1,6 @@
 //! Runs the links: inputs that switch outputs without a master.
 
-use modio_drivers::{CHANNELS, Channels, Kind, Quality};
+use modio_drivers::{CHANNELS, Channels, Codes, Kind};
 use register_map::links;
 
 use super::{Device, IoPort};
@@ -69,14 +69,34 @@ impl<const SLOTS: usize> Device<SLOTS> {
                 }
             }
             if let Some(outputs) = linking.outputs.get_mut(slot) {
-                let on = if powered_on { 0 } else { port.channels().bits() };
+                let on = if powered_on {
+                    0
+                } else {
+                    port.channels().bits()
+                };
                 outputs.forget(u8::MAX, on);
                 outputs.begin_held(held(slot));
             }
         }
     }
 
-    /// Takes the links from the settings after these may have changed. `changed` returns the channels of a slot whose
+    /// Returns the channels of each slot whose settings have changed and are not applied yet, channel 1 in bit 0.
+    pub(super) fn changed_sources(&self) -> [u8; SLOTS] {
+        let mut changed = [0; SLOTS];
+        if !links::exist(SLOTS) {
+            return changed;
+        }
+        for (slot, (port, changed)) in self.points.ports().iter().zip(&mut changed).enumerate() {
+            for channel in 0..CHANNELS {
+                let point = self.config.point(slot, channel);
+                let differs = point.is_some_and(|to| port.setting(channel) != Some(&to.settings));
+                *changed |= u8::from(differs) << channel;
+            }
+        }
+        changed
+    }
+
+    /// Takes the links from the settings after these may have changed. `changed` has the channels of each slot whose
     /// settings differ from those before, channel 1 in bit 0.
     pub(super) fn set_up_links(&mut self, changed: &[u8; SLOTS]) {
         if !links::exist(SLOTS) {
@@ -84,7 +104,8 @@ impl<const SLOTS: usize> Device<SLOTS> {
         }
         for (slot, channels) in changed.iter().enumerate() {
             let ports = self.points.ports();
-            let (Some(sources), Some(port)) = (self.linking.sources.get_mut(slot), ports.get(slot)) else {
+            let (Some(sources), Some(port)) = (self.linking.sources.get_mut(slot), ports.get(slot))
+            else {
                 continue;
             };
             for channel in (0..CHANNELS).filter(|channel| channels >> channel & 1 != 0) {
@@ -98,7 +119,9 @@ impl<const SLOTS: usize> Device<SLOTS> {
             let of_changed = links.clone().enumerate().filter(|(_, link)| {
                 let place = link.source().and_then(|point| self.points.index_of(point));
                 place.is_some_and(|(slot, channel)| {
-                    changed.get(slot).is_some_and(|channels| channels >> channel & 1 != 0)
+                    changed
+                        .get(slot)
+                        .is_some_and(|channels| channels >> channel & 1 != 0)
                 })
             });
             let of_changed = of_changed.fold(0, |mask, (index, _)| mask | 1 << index);
@@ -125,15 +148,21 @@ impl<const SLOTS: usize> Device<SLOTS> {
         }
     }
 
-    /// Stores the inputs of a scan of a slot as sources, `ms` milliseconds after the one before. `changed`: the digital
-    /// inputs that have changed, channel 1 in bit 0.
-    pub(super) fn scanned_sources(&mut self, slot: usize, changed: u8, ms: u32) {
+    /// Stores the inputs of a scan of a slot as sources, `ms` milliseconds after the one before: the codes of its lines, and
+    /// the digital inputs that have changed, channel 1 in bit 0.
+    pub(super) fn scanned_sources(&mut self, slot: usize, codes: &Codes, changed: u8, ms: u32) {
         if links::exist(SLOTS)
             && let Some(port) = self.points.ports().get(slot)
             && let Some(sources) = self.linking.sources.get_mut(slot)
         {
-            let bad = port.failing() | port.channels().bad();
-            sources.scanned(bad, changed, ms);
+            for (channel, (code, settings)) in codes.iter().zip(port.settings()).enumerate() {
+                if let Some(code) = code
+                    && port.kind(channel) == Kind::WordInput
+                {
+                    sources.add_code(channel, *code, settings);
+                }
+            }
+            sources.scanned(port.failing(), changed, ms);
         }
     }
 
@@ -171,7 +200,10 @@ impl<const SLOTS: usize> Device<SLOTS> {
         };
         for index in bits(outputs.levels()) {
             let link = config.link(slot, index);
-            let safe = points.ports().get(slot).and_then(|port| port.safe_bit(index % CHANNELS));
+            let safe = points
+                .ports()
+                .get(slot)
+                .and_then(|port| port.safe_bit(index % CHANNELS));
             let place = link.source().and_then(|point| points.index_of(point));
             if let Some((of, channel)) = place
                 && let (Some(port), Some(sources)) = (points.ports().get(of), sources.get(of))
@@ -184,7 +216,9 @@ impl<const SLOTS: usize> Device<SLOTS> {
             let link = config.link(slot, index);
             let place = link.source().and_then(|point| points.index_of(point));
             if let Some((of, from)) = place
-                && sources.get(of).is_some_and(|sources| sources.has_edge(from))
+                && sources
+                    .get(of)
+                    .is_some_and(|sources| sources.has_edge(from))
                 && let (Some(port), Some(of)) = (points.ports().get(slot), points.ports().get(of))
                 && let output = port.channels().bit(index % CHANNELS)
                 && let Some(act) = link.at_edge(of.channels().bit(from), output)
@@ -240,7 +274,11 @@ fn begin_source(sources: &mut Sources, port: &IoPort, channel: usize, long: bool
     let is_digital = port.kind(channel) == Kind::BitInput;
     let debounce = port.setting(channel).filter(|_| is_digital);
     let debounce = debounce.map_or(0, |setting| setting.filter);
-    let wait = if long || !is_digital { AFTER_POWER_ON_MS } else { 0 };
+    let wait = if long || !is_digital {
+        AFTER_POWER_ON_MS
+    } else {
+        0
+    };
     sources.begin(channel, wait + debounce);
 }
 
@@ -253,10 +291,10 @@ fn source(port: &IoPort, sources: &Sources, channel: usize) -> Source {
         }
     } else if port.kind(channel) == Kind::BitInput {
         Source::Bit(channels.bit(channel))
-    } else if channels.quality(channel) == Quality::Good {
-        Source::Word(channels.word(channel))
-    } else {
+    } else if sources.is_uncertain(channel) {
         Source::Uncertain
+    } else {
+        Source::Word(channels.word(channel))
     }
 }
 

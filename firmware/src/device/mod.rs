@@ -35,7 +35,7 @@ use modbus_server::fast::{self, EventSource, Packet, Waiting};
 use modbus_server::{
     Adu, Bits, BitsOut, DataModel, Exception, Server, Span, Table, TextOut, Words, WordsOut,
 };
-use modio_drivers::{CHANNELS, Channels};
+use modio_drivers::{CHANNELS, Channels, Codes};
 use register_map::configuration::COMMAND;
 use register_map::update::status;
 use register_map::{codes::Command, counters, edges, fault, name, second, state as state_map};
@@ -168,10 +168,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
             config,
         });
         device.configure_points();
-        device.for_each_point(|port, channel, point| {
-            port.command_raw(channel, point.start);
-            false
-        });
+        device.for_each_point(|port, channel, point| port.command_raw(channel, point.start));
         device.begin_links(|_| 0);
         device
     }
@@ -181,23 +178,20 @@ impl<const SLOTS: usize> Device<SLOTS> {
     fn configure_points(&mut self) {
         self.config.compare();
         self.revision = self.config.revision();
-        let changed = self.for_each_point(|port, channel, point| port.configure(channel, point));
+        let changed = self.changed_sources();
+        self.for_each_point(IoPort::configure);
         self.set_up_links(&changed);
     }
 
-    /// Passes the settings in force of every point to `act`, with the point's port and channel. Returns the channels of
-    /// each slot for which `act` returned true, channel 1 in bit 0.
-    fn for_each_point(&mut self, act: fn(&mut IoPort, usize, Point) -> bool) -> [u8; SLOTS] {
-        let mut results = [0; SLOTS];
-        let ports = self.points.ports_mut().iter_mut().zip(&mut results);
-        for (index, (port, result)) in ports.enumerate() {
+    /// Passes the settings in force of every point to `act`, with the point's port and channel.
+    fn for_each_point(&mut self, act: fn(&mut IoPort, usize, Point)) {
+        for (index, port) in self.points.ports_mut().iter_mut().enumerate() {
             for channel in 0..CHANNELS {
                 if let Some(point) = self.config.point(index, channel) {
-                    *result |= u8::from(act(port, channel, point)) << channel;
+                    act(port, channel, point);
                 }
             }
         }
-        results
     }
 
     /// Advances the time by `ms` milliseconds, at the begin of a scan. When the communication watchdog expires, sets the
@@ -221,12 +215,19 @@ impl<const SLOTS: usize> Device<SLOTS> {
         tripped
     }
 
-    /// Stores the inputs that a scan of a slot has read, `ms` milliseconds after the scan before. `words` is false when the
+    /// Stores the inputs that a scan of a slot has read from `codes`, `ms` milliseconds after the scan before. `words` is false when the
     /// settings have changed since the scan began: then the words of the scan have the wrong unit. The next scan calls
     /// [`Self::run_links`] for all slots after [`Self::tick`].
     // Not inlined into the scan, whose frame is large.
     #[inline(never)]
-    pub fn scanned(&mut self, slot: usize, channels: &Channels, words: bool, ms: u32) {
+    pub fn scanned(
+        &mut self,
+        slot: usize,
+        channels: &Channels,
+        codes: &Codes,
+        words: bool,
+        ms: u32,
+    ) {
         // 0 stands for an input without an edge.
         let now = self.state.millis().max(1);
         if ms > LONGEST_MS {
@@ -237,7 +238,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
             return;
         };
         let edges = port.scanned(channels, words, now);
-        self.scanned_sources(slot, edges, ms);
+        self.scanned_sources(slot, codes, edges, ms);
         let Some(port) = self.points.ports().get(slot) else {
             return;
         };

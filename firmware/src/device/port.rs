@@ -58,14 +58,13 @@ impl IoPort {
     }
 
     /// Applies the settings and SAFE of a channel. The output does not change: a commanded word is converted to the new
-    /// scale. Returns whether the settings differ from those before.
-    pub fn configure(&mut self, channel: usize, to: Point) -> bool {
+    /// scale.
+    pub fn configure(&mut self, channel: usize, to: Point) {
         let kind = self.kind(channel);
         let places = (self.settings.get_mut(channel), self.safe.get_mut(channel));
         let (Some(settings), Some(safe)) = places else {
-            return false;
+            return;
         };
-        let differs = *settings != to.settings;
         if kind == Kind::WordOutput {
             let word = self.channels.word(channel);
             let word = scale::output_rescaled(word, settings, &to.settings);
@@ -77,7 +76,6 @@ impl IoPort {
         if let Some(deadband) = self.deadbands.get_mut(channel) {
             *deadband = to.deadband;
         }
-        differs
     }
 
     /// Returns the settings that were applied last.
@@ -112,7 +110,6 @@ impl IoPort {
                 Kind::WordInput if words => {
                     self.channels.set_word(channel, scanned.word(channel));
                     self.channels.set_status(channel, scanned.status(channel));
-                    self.channels.set_quality(channel, scanned.quality(channel));
                 }
                 Kind::WordInput | Kind::None | Kind::BitOutput | Kind::WordOutput => {}
             }
@@ -167,7 +164,8 @@ impl IoPort {
     /// Returns the channels of this kind, channel 1 in bit 0.
     #[must_use]
     pub fn channels_of(&self, kind: Kind) -> u8 {
-        let of_kind = |mask, (channel, own): (usize, &Kind)| mask | u8::from(*own == kind) << channel;
+        let of_kind =
+            |mask, (channel, own): (usize, &Kind)| mask | u8::from(*own == kind) << channel;
         self.kinds.iter().enumerate().fold(0, of_kind)
     }
 

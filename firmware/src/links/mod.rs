@@ -14,14 +14,15 @@
 //! [`Sources`] says when an input has a value, [`Outputs`] what the links to the outputs of a slot do with it.
 
 mod outputs;
+mod plausible;
 mod sources;
 
 use modio_drivers::{CHANNELS, Kind};
 use register_map::codes::LinkAction;
 use register_map::links::{EACH, NO_SOURCE, WORDS};
 
-pub use outputs::{AFTER_A_WRITE_MS, Outputs, Source};
-pub use sources::{AFTER_A_FAULT_MS, AFTER_POWER_ON_MS, Sources};
+pub(crate) use outputs::{Outputs, Source};
+pub(crate) use sources::{AFTER_POWER_ON_MS, Sources};
 
 /// Number of links of a slot: the first links of its points, then the second ones.
 pub const OF_A_SLOT: usize = CHANNELS * EACH as usize;
@@ -218,6 +219,9 @@ mod tests {
         let (on, off) = (Some(true), Some(false));
         assert_eq!(levels, [off, None, None, on, off], "-1 is below 10");
         let frost = Link([3, 1, 0, 0xFFF6]);
-        assert_eq!([0xFFF6, 0xFFF5].map(|word| frost.level_of(word)), [None, off]);
+        assert_eq!(
+            [0xFFF6, 0xFFF5].map(|word| frost.level_of(word)),
+            [None, off]
+        );
     }
 }

@@ -16,7 +16,7 @@ const OUTPUTS: usize = OF_A_SLOT / 2;
 
 /// What a source is for a level link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Source {
+pub(crate) enum Source {
     /// It has no value. `good`: it will have one after its wait.
     NoValue {
         /// It is good.
@@ -26,13 +26,13 @@ pub enum Source {
     Bit(bool),
     /// The word of an analog input.
     Word(u16),
-    /// An analog input of uncertain quality: a link keeps what it wanted.
+    /// An analog input whose value is uncertain: a link keeps what it wanted.
     Uncertain,
 }
 
 /// The state of the links to the outputs of a slot.
 #[derive(Debug)]
-pub struct Outputs {
+pub(crate) struct Outputs {
     /// Level links.
     levels: u8,
     /// Links that act at edges.
@@ -192,7 +192,14 @@ impl Outputs {
 
     /// Looks at the source of a level link. `safe` is SAFE of its output, `None` for hold. `look`: a word is compared with
     /// the thresholds even if the link knows what it wants.
-    pub fn look(&mut self, index: usize, link: &Link, source: Source, safe: Option<bool>, look: bool) {
+    pub fn look(
+        &mut self,
+        index: usize,
+        link: &Link,
+        source: Source,
+        safe: Option<bool>,
+        look: bool,
+    ) {
         let mask = 1 << (index % OF_A_SLOT);
         let known = self.known & mask != 0;
         let want = match source {

@@ -10,7 +10,9 @@
 //! A digital input waits for its debounce as well. So neither a contact that is closed when the power returns is an
 //! edge, nor a supply of 24 V that comes later than that of the unit, nor does a transmitter count that starts at 0 mA.
 
-use modio_drivers::CHANNELS;
+use modio_drivers::{CHANNELS, ChannelSettings};
+
+use super::plausible::Plausible;
 
 /// Time in ms from a power-on, or from a change of its settings, until a source has a value.
 pub const AFTER_POWER_ON_MS: u16 = 1_000;
@@ -20,7 +22,7 @@ pub const AFTER_A_FAULT_MS: u16 = 60_000;
 
 /// The inputs of a port. Masks have channel 1 in bit 0.
 #[derive(Debug)]
-pub struct Sources {
+pub(crate) struct Sources {
     /// Time in ms until each has a value.
     waits: [u16; CHANNELS],
     /// Channels that wait, or are not good.
@@ -29,6 +31,8 @@ pub struct Sources {
     bad: u8,
     /// Digital inputs that had another value in the scan before the last one.
     edges: u8,
+    /// The codes of analog inputs.
+    codes: [Plausible; CHANNELS],
 }
 
 impl Sources {
@@ -40,6 +44,7 @@ impl Sources {
             waiting: 0,
             bad: 0,
             edges: 0,
+            codes: [const { Plausible::new() }; CHANNELS],
         }
     }
 
@@ -49,15 +54,26 @@ impl Sources {
             self.waits[channel] = wait_ms;
             self.waiting |= 1 << channel;
             self.edges &= !(1 << channel);
+            self.codes[channel] = Plausible::new();
         }
     }
 
-    /// Stores a scan, `ms` milliseconds after the one before: the channels that are not good, and those whose level has
+    /// Adds the code of an analog input, before [`scanned`](Self::scanned) for the same scan.
+    pub fn add_code(&mut self, channel: usize, code: u16, settings: &ChannelSettings) {
+        if let Some(codes) = self.codes.get_mut(channel) {
+            codes.add(code, settings);
+        }
+    }
+
+    /// Stores a scan, `ms` milliseconds after the one before: the channels that cannot be read, and those whose level has
     /// changed.
-    pub fn scanned(&mut self, bad: u8, changed: u8, ms: u32) {
+    pub fn scanned(&mut self, failing: u8, changed: u8, ms: u32) {
         let before = self.waiting;
-        self.bad = bad;
-        self.waiting |= bad;
+        self.bad = failing;
+        for (channel, codes) in self.codes.iter().enumerate() {
+            self.bad |= u8::from(codes.is_bad()) << channel;
+        }
+        self.waiting |= self.bad;
         if self.waiting != 0 {
             self.wait(ms);
         }
@@ -88,6 +104,14 @@ impl Sources {
     #[must_use]
     pub const fn is_good(&self, channel: usize) -> bool {
         self.bad >> (channel & 7) & 1 == 0
+    }
+
+    /// Returns whether the last codes of an analog input make its value uncertain, although it is good.
+    #[must_use]
+    pub fn is_uncertain(&self, channel: usize) -> bool {
+        self.codes
+            .get(channel)
+            .is_some_and(|codes| !codes.is_good())
     }
 
     /// Returns whether a digital input changed between its values in the last two scans.

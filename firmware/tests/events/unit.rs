@@ -122,7 +122,7 @@ impl Unit {
         self.device.tick(passed_ms);
         let mut channels = *self.device.points.ports()[0].channels();
         (0..4).for_each(|n| channels.set_bit(n, self.levels >> n & 1 != 0));
-        self.device.scanned(0, &channels, true, 1);
+        self.device.scanned(0, &channels, &[None; 4], true, 1);
     }
 
     /// Receives characters from `start` to `end`, after the silence since the last ones.

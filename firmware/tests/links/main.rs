@@ -18,7 +18,7 @@ use firmware::device::{Device, Fixed, Identity};
 use firmware::kept_outputs::{KeptOutputs, half_word_of};
 use modbus_server::line::{Faults, Framing, Port, Receiver};
 use modbus_server::{Adu, Server, crc};
-use modio_drivers::{Channels, Quality};
+use modio_drivers::Channels;
 use register_map::board::MODIO_08;
 use register_map::{Module, configuration as at, links};
 use serde_json::Value;
@@ -156,7 +156,11 @@ impl Unit {
 
     /// Starts the unit: after a power-on, or with the outputs that a reset has kept.
     fn start_with(&mut self, kept: Option<&KeptOutputs>) {
-        let start = if kept.is_some() { at::AS_IT_WAS } else { self.start };
+        let start = if kept.is_some() {
+            at::AS_IT_WAS
+        } else {
+            self.start
+        };
         let mut settings = vec![
             (at::COMM_TIMEOUT, TIMEOUT.0),
             (at::FILTER + DIGITAL, 0),
@@ -242,9 +246,10 @@ impl Unit {
         let mut channels = Channels::new();
         channels.set_bit(0, self.raw.0);
         channels.set_word(0, self.raw.1.cast_unsigned());
-        channels.set_quality(0, if self.good { Quality::Good } else { Quality::Bad });
-        device.scanned(0, &channels, true, 1);
-        device.scanned(2, &channels, true, 1);
+        // Unlike implausible codes, a line without codes is not good from the first scan on.
+        device.points.ports_mut()[2].set_failing(u8::from(!self.good));
+        device.scanned(0, &channels, &[None; 4], true, 1);
+        device.scanned(2, &channels, &[None; 4], true, 1);
         device.tick(u32::from(self.now > 0));
         self.now += 1;
         (0..4).for_each(|slot| device.run_links(slot));
@@ -259,7 +264,9 @@ fn lines(text: &str) -> impl Iterator<Item = Value> {
 /// Returns the entries of an object by time in ms.
 fn by_time(object: &Value) -> BTreeMap<u32, Value> {
     let entries = object.as_object().unwrap().iter();
-    entries.map(|(ms, value)| (ms.parse().unwrap(), value.clone())).collect()
+    entries
+        .map(|(ms, value)| (ms.parse().unwrap(), value.clone()))
+        .collect()
 }
 
 #[test]
@@ -278,7 +285,10 @@ fn links_play_every_scenario_of_their_rules() {
             let on = unit.scan();
             moves += u32::from(before.is_some_and(|before| before != on));
             before = Some(on);
-            if states.get(&ms).is_some_and(|state| state.as_bool() != Some(on)) {
+            if states
+                .get(&ms)
+                .is_some_and(|state| state.as_bool() != Some(on))
+            {
                 broken.push(format!("{}: {on} at {ms} ms", scenario["name"]));
                 break;
             }

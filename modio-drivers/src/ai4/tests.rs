@@ -5,7 +5,7 @@ use std::vec::Vec;
 
 use super::*;
 use crate::Kind;
-use crate::{ChannelStatus, Quality, STALLED_SCANS, Scale, Signal};
+use crate::{ChannelStatus, STALLED_SCANS, Scale, Signal};
 
 fn with(filter: u16, signal: Signal, scale: Scale) -> ChannelSettings {
     ChannelSettings {
@@ -202,43 +202,4 @@ fn short_stalls_are_not_added_up() {
         }
         scan(&mut module, &mut channels, [0; 4]);
     }
-}
-
-#[test]
-fn quality_is_bad_after_ten_implausible_codes_and_good_after_ten_plausible_ones_in_a_row() {
-    use Quality::{Bad, Good, Uncertain};
-    // 20 degC, and a wire that is cut.
-    let (warm, cut) = (2_269, 4_095);
-    for filter in [0, 8] {
-        let mut module = Ai4::default();
-        module.configure(&[with(filter, Signal::Ntc, Scale::Engineering); 4]);
-        let mut channels = Channels::new();
-        let mut quality = |code, scans| {
-            (0..scans).for_each(|_| _ = scan(&mut module, &mut channels, [warm, code, warm, warm]));
-            assert_eq!([0, 2, 3].map(|other| channels.quality(other)), [Good; 3]);
-            channels.quality(1)
-        };
-        assert_eq!(quality(warm, 1), Good);
-        assert_eq!([quality(cut, 1), quality(cut, 8)], [Uncertain; 2]);
-        assert_eq!([quality(warm, 9), quality(warm, 1)], [Uncertain, Good]);
-        // Nine implausible codes of ten, as often as they like, are no ten plausible ones in a row.
-        assert_eq!([quality(cut, 9), quality(warm, 1)], [Uncertain; 2]);
-        assert_eq!([quality(cut, 1), quality(cut, 100)], [Bad; 2]);
-        assert_eq!([quality(warm, 9), quality(cut, 1)], [Bad; 2]);
-        assert_eq!([quality(warm, 9), quality(warm, 1)], [Bad, Good]);
-    }
-}
-
-#[test]
-fn change_of_a_channels_settings_makes_its_quality_good_again() {
-    let mut module = Ai4::default();
-    let current = with(0, Signal::Current, Scale::Raw);
-    module.configure(&[current; 4]);
-    let mut channels = Channels::new();
-    (0..20).for_each(|_| _ = scan(&mut module, &mut channels, [0; 4]));
-    assert_eq!(channels.bad(), 0b1111);
-    let voltage = with(0, Signal::Voltage, Scale::Raw);
-    module.configure(&[current, voltage, current, current]);
-    scan(&mut module, &mut channels, [0; 4]);
-    assert_eq!(channels.bad(), 0b1101);
 }

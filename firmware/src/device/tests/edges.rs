@@ -52,7 +52,7 @@ fn file_3_is_the_log_of_edges() {
     bench.device.tick(40);
     let mut channels = *bench.device.points.ports()[1].channels();
     channels.set_bit(0, true);
-    bench.device.scanned(1, &channels, true, 40);
+    bench.device.scanned(1, &channels, &[None; 4], true, 40);
     // The count and the two newest edges in one request.
     let bytes = bench.read_file(&[(3, 0, 1), (3, 187, 6)]).unwrap();
     assert_eq!(number(&bytes), 2);

@@ -5,6 +5,7 @@ use register_map::record::{encode_page, records};
 use register_map::{configuration::AS_IT_WAS, links};
 
 use super::*;
+use crate::kept_outputs::{KeptOutputs, half_word_of};
 use crate::outputs::Outputs;
 
 /// Digital outputs at points 0 to 3, relays at points 6 and 7, analog outputs at points 8 to 11, inputs at 12 to 15.
@@ -115,30 +116,102 @@ fn commanded_values_are_kept_while_outputs_are_at_safe() {
 }
 
 #[test]
-fn a_link_is_kept_and_a_pulse_is_not() {
-    let mut bench = keeping(&[(at::COMM_TIMEOUT, 5)]);
+fn an_edge_link_is_kept_a_pulse_and_an_output_that_a_link_always_holds_are_not() {
+    let mut bench = keeping(&[(at::COMM_TIMEOUT, 50)]);
     bench.unlock();
-    for (point, input, action) in [(0, 12, LinkAction::Toggle), (1, 13, LinkAction::Pulse)] {
+    for (point, input, action) in [
+        (0, 12, LinkAction::Toggle),
+        (1, 13, LinkAction::Pulse),
+        (3, 14, LinkAction::Follow),
+        (7, 14, LinkAction::FollowAlone),
+    ] {
         let link = [input, action.code(), 10, 0];
         bench.write(links::of_point(point, false), &link).unwrap();
     }
-    bench.scan_port(3, |_| {});
-    bench.scan_port(3, |channels| {
-        channels.set_bit(0, true);
-        channels.set_bit(1, true);
-    });
-    assert_eq!(bench.values().0, 0b0011);
-    assert_eq!(bench.device.outputs()[0], (0xE280, 0x0B01));
+    bench.pass(1_010);
+    bench.scan_port(3, |channels| channels.set_bits(0b0111, 0b0111));
+    assert_eq!(bench.values().0, 0b0000_1011);
+    assert_eq!(
+        pairs(&bench.device.outputs())[..2],
+        [(0xE280, 0x0301), (0xE384, 0x0800)]
+    );
     // A link counts as well after SAFE.
-    bench.device.request_seen(0, false);
-    assert!(bench.device.tick(500));
-    assert_eq!(bench.values().0, 0);
-    assert_eq!(bench.device.outputs()[0], (0xE280, 0x0B01));
-    for _ in 0..2 {
-        bench.scan_port(3, |channels| channels.set_bit(0, false));
-        bench.scan_port(3, |channels| channels.set_bit(0, true));
+    let now = bench.device.state.millis();
+    bench.device.request_seen(now, false);
+    bench.pass(5_000);
+    assert_eq!(bench.values().0, 0b1000_1000, "both level links hold");
+    assert_eq!(
+        pairs(&bench.device.outputs())[..2],
+        [(0xE280, 0x0301), (0xE384, 0x0808)]
+    );
+    for level in [0, 1, 0, 1] {
+        bench.scan_port(3, |channels| channels.set_bits(1, level));
     }
-    assert_eq!(bench.device.outputs()[0], (0xE280, 0x0B00));
+    assert_eq!(bench.device.outputs()[0], (0xE280, 0x0300));
+}
+
+/// Returns what a reset now keeps.
+fn kept(bench: &Bench<4>) -> KeptOutputs {
+    let mut values = [0; 32];
+    for (slot, port) in bench.device.points.ports().iter().enumerate() {
+        for channel in 0..4 {
+            values[slot * 4 + channel] = half_word_of(port.commanded(channel));
+        }
+    }
+    KeptOutputs {
+        values,
+        modules: bench.device.modules_in_force(),
+        held: bench.device.held_outputs(),
+    }
+}
+
+#[test]
+fn reset_keeps_outputs_as_they_were_and_held_ones_and_no_others() {
+    // Output 3 of the 4DO is held by a link, with START 0; relay 1 by one that acts while there is no master.
+    let stored = [
+        (at::COMM_TIMEOUT, 5),
+        (at::SAFE + 9, 300),
+        (links::of_point(2, false), 12),
+        (links::of_point(2, false) + 1, LinkAction::Invert.code()),
+        (links::of_point(6, false), 12),
+        (
+            links::of_point(6, false) + 1,
+            LinkAction::InvertAlone.code(),
+        ),
+    ];
+    let mut bench = keeping(&stored);
+    bench.ask(&[0x0F, 0, 0, 0, 4, 1, 0b0011]);
+    bench.write(8, &[100, 200, 400]).unwrap();
+    bench.pass(1_100);
+    // SAFE of 0x0 and 0x8 is 0, of 0x9 it is 300. Both links hold.
+    assert_eq!(bench.values(), (0b0100_0100, std::vec![0, 300, 0, 0]));
+    bench.ask(&[0x0F, 0, 0, 0, 2, 1, 0b10]);
+    bench.write(10, &[401]).unwrap();
+    let before = kept(&bench);
+    assert_eq!(before.held, 0b0100_0100);
+    let mut next = keeping(&stored);
+    next.device.start_outputs(Some(&before), None);
+    // The third analog output has START.
+    assert_eq!(next.values(), (0b0100_0110, std::vec![0, 300, 0, 0]));
+    // Another reset, before the links know again.
+    next.pass(3);
+    let mut third = keeping(&stored);
+    third.device.start_outputs(Some(&kept(&next)), None);
+    assert_eq!(third.values().0, 0b0000_0110, "WHEN 1 held no more");
+
+    let mut others = before;
+    others.modules ^= 1;
+    let mut next = keeping(&stored);
+    next.device.start_outputs(Some(&others), None);
+    assert_eq!(next.values(), (0, std::vec![0; 4]), "of other modules");
+    let mut damaged = before;
+    damaged.values[1] ^= 1;
+    let mut page = [0xFF; 200];
+    encode_page(0, &[(0xE280, 0x0203)], &mut page).unwrap();
+    let (_, record) = records(&page).next().unwrap();
+    let mut next = keeping(&stored);
+    next.device.start_outputs(Some(&damaged), Some(&record));
+    assert_eq!(next.values().0, 0b0100_0110, "from the record");
 }
 
 #[test]

@@ -1,9 +1,8 @@
-//! Links, as a master sets them up and as inputs run them.
+//! Links, as a master sets them up, and what the scenarios of `tests/links` do not show of the inputs that run them.
 
 use super::*;
-use register_map::codes::LinkAction::{
-    self, Follow, FollowAlone, Invert, Pulse, Reset, Set, Toggle,
-};
+use modio_drivers::{Ai4, IoModule as _};
+use register_map::codes::LinkAction::{self, Follow, Invert, Pulse, Set, Toggle};
 use register_map::links;
 
 /// The outputs are those of port 2, points 4 to 7; the inputs those of port 1, points 0 to 3, and the analog ones of port
@@ -17,14 +16,14 @@ fn link(source: u16, action: LinkAction, words: [u16; 2]) -> [u16; 4] {
     [source, action.code(), words[0], words[1]]
 }
 
-/// A device with links of point 4. Its inputs have been scanned once.
+/// A device with links of point 4, long enough after its start and after their write that they act.
 fn linked(first: [u16; 4], second: [u16; 4]) -> Bench<4> {
     let mut bench = Bench::on(&MODIO_08, MODULES, &[(at::COMM_TIMEOUT, 10)]);
     bench.unlock();
     for (second, words) in [(false, first), (true, second)] {
         assert_eq!(bench.write(links::of_point(OUTPUT, second), &words), Ok(()));
     }
-    bench.input(0, false);
+    bench.pass(1_010);
     bench
 }
 
@@ -34,11 +33,6 @@ impl Bench<4> {
     /// Scans a digital input with this level.
     fn input(&mut self, channel: usize, level: bool) {
         self.scan_port(0, |channels| channels.set_bit(channel, level));
-    }
-
-    /// Scans an analog input with this word.
-    fn word(&mut self, word: u16) {
-        self.scan_port(2, |channels| channels.set_word(0, word));
     }
 
     fn output(&mut self) -> bool {
@@ -56,14 +50,6 @@ impl Bench<4> {
             self.input(channel, level);
             self.output()
         })
-    }
-
-    /// Runs scans for this time.
-    fn pass(&mut self, ms: u32) {
-        for _ in 0..ms {
-            self.device.tick(1);
-            (0..4).for_each(|port| self.scan_port(port, |_| {}));
-        }
     }
 }
 
@@ -125,7 +111,7 @@ fn a_link_is_checked_as_a_whole() {
         [4, 1, 0, 0],
         [ANALOG, 3, 0, 0],
         [ANALOG, 1, 1, 2],
-        [0, 7, 0, 0],
+        [0, 8, 0, 0],
         [0, 0x201, 0, 0],
         [0, 4, 0, 0],
     ] {
@@ -150,211 +136,6 @@ fn a_link_is_checked_as_a_whole() {
 }
 
 #[test]
-fn actions_happen_at_edges() {
-    for (action, presses) in [
-        (Follow, [[true, false], [true, false]]),
-        (Invert, [[false, true], [false, true]]),
-        (Toggle, [[true, true], [false, false]]),
-        (Set, [[true, true], [true, true]]),
-        (Reset, [[false, false], [false, false]]),
-    ] {
-        let mut bench = linked(link(2, action, [0; 2]), NONE);
-        assert!(!bench.output(), "{action:?}: no edge yet");
-        let pressed = [bench.press(2), bench.press(2)];
-        assert_eq!(pressed, presses, "{action:?}");
-    }
-}
-
-#[test]
-fn a_write_stays_until_the_next_edge() {
-    let mut bench = linked(link(2, Follow, [0; 2]), NONE);
-    bench.input(2, true);
-    bench.write_output(false);
-    bench.pass(5);
-    assert!(!bench.output());
-    bench.input(2, false);
-    bench.write_output(true);
-    bench.pass(5);
-    assert!(bench.output());
-    assert_eq!(bench.press(2), [true, false]);
-    let mut bench = linked(link(2, Toggle, [0; 2]), NONE);
-    bench.write_output(true);
-    assert_eq!(bench.press(2), [false, false], "from the written value");
-}
-
-#[test]
-fn an_output_is_the_or_of_the_links_that_it_follows() {
-    let mut bench = linked(link(0, Follow, [0; 2]), link(1, Invert, [0; 2]));
-    // Input 2 is off, so the second link wants the output on.
-    assert_eq!(bench.press(0), [true, true]);
-    bench.input(1, true);
-    assert!(!bench.output());
-    assert_eq!(bench.press(0), [true, false]);
-    // Both inputs change in one scan.
-    bench.scan_port(0, |channels| {
-        channels.set_bit(0, true);
-        channels.set_bit(1, false);
-    });
-    assert!(bench.output());
-    bench.scan_port(0, |channels| {
-        channels.set_bit(0, false);
-        channels.set_bit(1, true);
-    });
-    assert!(!bench.output());
-    // A link with another action has its own edges.
-    let mut bench = linked(link(0, Follow, [0; 2]), link(1, Set, [0; 2]));
-    assert_eq!(bench.press(1), [true, true]);
-    assert_eq!(bench.press(0), [true, false]);
-}
-
-#[test]
-fn a_pulse_lasts_its_time_and_a_rising_edge_starts_it_again() {
-    let mut bench = linked(link(0, Pulse, [2, 0]), NONE);
-    bench.pass(10);
-    assert_eq!(bench.press(0), [true, true]);
-    bench.pass(199);
-    assert!(bench.output());
-    bench.pass(1);
-    assert!(!bench.output());
-    bench.press(0);
-    bench.pass(150);
-    bench.press(0);
-    bench.pass(199);
-    assert!(bench.output());
-    bench.pass(1);
-    assert!(!bench.output());
-}
-
-#[test]
-fn what_acts_on_an_output_later_ends_its_pulse() {
-    let mut bench = linked(link(0, Pulse, [2, 0]), link(1, Set, [0; 2]));
-    bench.press(0);
-    bench.write_output(true);
-    bench.pass(300);
-    assert!(bench.output(), "the write");
-    bench.write_output(false);
-    bench.press(0);
-    bench.press(1);
-    bench.pass(300);
-    assert!(bench.output(), "the other link");
-}
-
-#[test]
-fn links_for_a_missing_master_rest_while_there_is_one() {
-    let mut bench = linked(link(0, FollowAlone, [0; 2]), link(1, Follow, [0; 2]));
-    bench.device.request_seen(0, false);
-    assert_eq!(bench.press(0), [false, false]);
-    // Nor does it count when the other link acts.
-    bench.input(0, true);
-    assert_eq!(bench.press(1), [true, false]);
-    bench.input(0, false);
-    bench.write_output(true);
-    bench.pass(999);
-    assert_eq!(bench.press(0), [true, true]);
-    bench.pass(1);
-    assert!(!bench.output(), "SAFE");
-    assert_eq!(bench.press(0), [true, false]);
-    bench.input(0, true);
-    assert_eq!(bench.press(1), [true, true], "both are awake");
-    let now = bench.device.state.millis();
-    bench.device.request_seen(now, false);
-    bench.input(0, false);
-    assert!(bench.output(), "it stays until an edge or a write");
-    assert_eq!(bench.press(1), [true, false]);
-}
-
-#[test]
-fn a_pulse_ends_while_its_link_rests_and_safe_replaces_it() {
-    let pulse = link(0, LinkAction::PulseAlone, [1, 0]);
-    let mut bench = linked(pulse, NONE);
-    bench.pass(1000);
-    assert_eq!(bench.press(0), [true, true]);
-    let now = bench.device.state.millis();
-    bench.device.request_seen(now, false);
-    bench.pass(99);
-    assert!(bench.output());
-    bench.pass(1);
-    assert!(!bench.output());
-    // SAFE = 1 during a pulse.
-    let mut bench = linked(link(0, Pulse, [1, 0]), NONE);
-    bench.write(at::SAFE + OUTPUT, &[1]).unwrap();
-    bench.device.request_seen(0, false);
-    bench.pass(950);
-    bench.press(0);
-    bench.pass(200);
-    assert!(bench.output());
-    // SAFE = hold changes nothing, so the pulse ends.
-    let mut bench = linked(link(0, Pulse, [1, 0]), NONE);
-    bench.write(at::SAFE + OUTPUT, &[at::HOLD]).unwrap();
-    bench.device.request_seen(0, false);
-    bench.pass(950);
-    bench.press(0);
-    bench.pass(200);
-    assert!(!bench.output());
-}
-
-#[test]
-fn analog_inputs_switch_at_their_thresholds() {
-    let mut bench = linked(link(ANALOG, Follow, [2000, 1000]), NONE);
-    bench.word(3000);
-    assert!(bench.output(), "from 0");
-    for (word, on) in [
-        (1500, true),
-        (1000, true),
-        (999, false),
-        (2000, false),
-        (2001, true),
-    ] {
-        bench.word(word);
-        assert_eq!(bench.output(), on, "{word}");
-    }
-    // A level that a write of the link finds is no edge.
-    bench.write_output(false);
-    bench.write(0x0412, &[1800]).unwrap();
-    bench.word(2001);
-    assert!(!bench.output());
-    bench.word(500);
-    bench.word(1801);
-    assert!(bench.output());
-}
-
-#[test]
-fn levels_at_the_start_and_of_a_new_link_are_no_edges() {
-    let stored = [
-        (0x0410, 0),
-        (0x0411, Follow.code()),
-        (0x0494, ANALOG),
-        (0x0495, Follow.code()),
-        (0x0496, 10),
-    ];
-    let mut bench = Bench::on(&MODIO_08, MODULES, &stored);
-    for (port, channels) in bench
-        .device
-        .points
-        .ports()
-        .iter()
-        .map(|port| *port.channels())
-        .enumerate()
-        .collect::<Vec<_>>()
-    {
-        let mut channels = channels;
-        channels.set_bit(0, true);
-        channels.set_word(0, 4000);
-        bench.device.scanned(port, &channels, true, 1);
-    }
-    (0..4).for_each(|slot| bench.device.run_links(slot));
-    let bits = |bench: &mut Bench<4>| bench.ask(&[1, 0, OUTPUT as u8, 0, 4])[2];
-    assert_eq!(bits(&mut bench), 0);
-    bench.unlock();
-    bench.write(0x0498, &link(0, Toggle, [0; 2])).unwrap();
-    bench.pass(3);
-    assert_eq!(bits(&mut bench), 0);
-    assert_eq!(bench.press(0), [false, false], "no rising edge");
-    bench.press(0);
-    assert_eq!(bits(&mut bench), 0b0100);
-}
-
-#[test]
 fn a_link_acts_only_where_a_write_would() {
     let mut bench = linked(link(0, Set, [0; 2]), NONE);
     bench.device.points.ports_mut()[1].set_failing(0b0001);
@@ -365,6 +146,7 @@ fn a_link_acts_only_where_a_write_would() {
     assert!(bench.output());
     // The coil of a relay in manual mode, as by a write.
     bench.write(0x0438, &link(0, Toggle, [0; 2])).unwrap();
+    bench.pass(1_000);
     bench.scan_port(3, |channels| channels.set_bit(0, true));
     bench.press(0);
     assert_eq!(bench.ask(&[1, 0, 14, 0, 1]), [1, 1, 1]);
@@ -382,6 +164,7 @@ fn links_of_a_port_rest_after_a_change_of_its_module() {
     assert_eq!(bench.read(0x0414, 4).unwrap(), NONE);
     assert_eq!(bench.read(0x0438, 4), Err(2), "no longer an output");
     bench.write(0x0414, &link(12, Toggle, [0; 2])).unwrap();
+    bench.pass(1_000);
     bench.scan_port(3, |channels| channels.set_bit(0, true));
     assert_eq!(
         bench.ask(&[1, 0, 5, 0, 1]),
@@ -396,35 +179,162 @@ fn links_of_a_port_rest_after_a_change_of_its_module() {
     assert_eq!(bench.read(0x0410, 4), Err(2));
     assert_eq!(bench.read(0x0418, 8).unwrap(), [NONE; 2].as_flattened());
     bench.write(0x0418, &link(0, Toggle, [0; 2])).unwrap();
+    bench.pass(1_000);
     bench.press(0);
     assert_eq!(bench.ask(&[1, 0, 4, 0, 4]), [1, 1, 0b0001]);
 }
 
 #[test]
+fn write_of_a_link_is_no_edge_whatever_its_inputs_had() {
+    // Between the scan of the inputs and the links a request changes the source to an input with another level.
+    let mut bench = linked(link(0, Toggle, [0; 2]), NONE);
+    bench.scan_port(0, |channels| channels.set_bit(1, true));
+    bench.pass(10);
+    for source in [1, 0, 1] {
+        bench.device.tick(1);
+        bench.write(0x0410, &[source]).unwrap();
+        bench.scan_port(0, |_| {});
+        bench.pass(1_500);
+        assert!(!bench.output(), "source {source}");
+    }
+    assert_eq!(bench.press(1), [false, false], "it was on");
+    assert_eq!(bench.press(1), [true, true]);
+}
+
+#[test]
 fn edge_of_a_scan_reaches_a_link_although_a_setting_is_written_before_the_links_run() {
-    let mut bench = linked(link(0, Follow, [0; 2]), NONE);
+    let mut bench = linked(link(0, Toggle, [0; 2]), NONE);
     // As `Scanning::run` does it: the inputs under one lock, then the links under others. A request is served in between.
     let mut channels = *bench.device.points.ports()[0].channels();
     channels.set_bit(0, true);
-    bench.device.scanned(0, &channels, true, 1);
+    bench.device.scanned(0, &channels, &[None; 4], true, 1);
     bench.write(at::RESPONSE_DELAY, &[1]).unwrap();
     (0..4).for_each(|slot| bench.device.run_links(slot));
     assert!(bench.output(), "the edge was lost");
 }
 
 #[test]
-fn change_of_the_scale_of_an_analog_source_is_no_edge() {
-    // 2000 raw is 4884 mV.
-    let mut bench = linked(link(ANALOG, Follow, [4000, 3000]), NONE);
-    bench.word(2000);
-    assert!(!bench.output());
-    bench.write(at::SCALE + ANALOG, &[1]).unwrap();
-    let mut channels = *bench.device.points.ports()[2].channels();
-    channels.set_word(0, 4884);
-    // The scan under way when the setting was written, then the first one with the new scale.
-    for words in [false, true] {
-        bench.device.scanned(2, &channels, words, 1);
-        (0..4).for_each(|slot| bench.device.run_links(slot));
+fn loaded_defaults_and_dropped_changes_count_as_writes_of_all_links() {
+    let mut bench = linked(link(0, Follow, [0; 2]), NONE);
+    bench.write(at::COMMAND, &[1]).unwrap();
+    bench.device.config.end_save(false);
+    bench.input(0, true);
+    assert!(bench.output());
+    for command in [3, 4] {
+        bench.write(at::COMMAND, &[command]).unwrap();
+        bench.write_output(false);
+        bench.pass(990);
+        assert!(!bench.output(), "it rests after COMMAND {command}");
     }
-    assert!(!bench.output(), "the input has not changed");
+    bench.pass(10);
+    assert!(bench.output());
+}
+
+#[test]
+fn driven_output_never_has_what_a_master_writes_into_a_held_one() {
+    let mut bench = linked(link(0, Follow, [0; 2]), NONE);
+    bench.input(0, true);
+    for _ in 0..3 {
+        bench.write_output(false);
+        // The scan that the write causes, which runs no links.
+        assert!(bench.device.driven(1).bit(0));
+        bench.pass(1);
+        assert!(bench.device.driven(1).bit(0) && bench.output());
+    }
+    // SAFE is 0, and does not show.
+    let now = bench.device.state.millis();
+    bench.device.request_seen(now, true);
+    for _ in 0..1_100 {
+        bench.pass(1);
+        assert!(bench.device.driven(1).bit(0));
+    }
+    assert!(bench.device.comm_watchdog.has_expired());
+}
+
+/// A heater or a fan at point 4, and the codes of its sensor at input 1 of port 3 through the driver of the module.
+struct Sensor {
+    bench: Bench<4>,
+    module: Ai4,
+}
+
+impl Sensor {
+    fn new(range: u16, filter: u16, heater: [u16; 4]) -> Self {
+        let mut bench = Bench::on(
+            &MODIO_08,
+            MODULES,
+            &[
+                (at::FILTER + ANALOG, filter),
+                (at::RANGE + ANALOG, range),
+                (at::SCALE + ANALOG, 1),
+            ],
+        );
+        bench.unlock();
+        bench.write(0x0410, &heater).unwrap();
+        Self {
+            bench,
+            module: Ai4::default(),
+        }
+    }
+
+    /// Scans these codes, one in each ms. Returns how often the output was on.
+    fn scan(&mut self, codes: impl Iterator<Item = u16>) -> usize {
+        let mut on = 0;
+        for code in codes {
+            let device = &mut self.bench.device;
+            let mut channels = *device.points.ports()[2].channels();
+            self.module.configure(device.points.ports()[2].settings());
+            let codes = [Some(code), None, None, None];
+            // The lines without codes fail.
+            let _ = self.module.read_inputs(&mut channels, &codes);
+            device.scanned(2, &channels, &codes, true, 1);
+            device.tick(1);
+            (0..4).for_each(|slot| device.run_links(slot));
+            on += usize::from(device.driven(1).bit(0));
+        }
+        on
+    }
+}
+
+#[test]
+fn loose_or_cut_wire_switches_neither_a_heater_nor_a_fan_on() {
+    // Ranges, codes in between the thresholds and beyond, of a broken wire, and the links that switch on beyond them. An
+    // NTC at 20 degC and at 40 degC, a loop at 12 mA and at 18 mA.
+    let heaters = [
+        (2, 2_269, 4_095, link(ANALOG, Invert, [180, 150])),
+        (1, 2_457, 0, link(ANALOG, Invert, [9_000, 8_000])),
+        (1, 2_457, 0, link(ANALOG, Invert, [9_000, 3_000])),
+        // A fan, and a thermistor with a short circuit.
+        (2, 2_269, 0, link(ANALOG, Follow, [300, 280])),
+    ];
+    for (range, good, broken, heater) in heaters {
+        for filter in [0, 4, 8] {
+            for on_off in [25, 8, 3] {
+                let mut sensor = Sensor::new(range, filter, heater);
+                assert_eq!(sensor.scan((0..3_000).map(|_| good)), 0);
+                let loose = |ms: u32| {
+                    if ((ms + 1) / on_off).is_multiple_of(2) {
+                        broken
+                    } else {
+                        good
+                    }
+                };
+                let on = sensor.scan((0..10_000).map(loose));
+                assert_eq!(on, 0, "range {range}, filter {filter}, {on_off} ms");
+            }
+            let mut sensor = Sensor::new(range, filter, heater);
+            sensor.scan((0..3_000).map(|_| good));
+            assert_eq!(sensor.scan((0..5_000).map(|_| broken)), 0, "cut");
+            assert_eq!(sensor.scan((0..70_000).map(|_| good)), 0, "mended");
+        }
+    }
+}
+
+#[test]
+fn heater_works_again_a_minute_after_its_sensor_was_mended() {
+    let mut sensor = Sensor::new(2, 4, link(ANALOG, Invert, [180, 150]));
+    // 0 degC.
+    assert!(sensor.scan((0..3_000).map(|_| 3_156)) > 1_900);
+    assert_eq!(sensor.scan((0..20).map(|_| 4_095)), 9, "SAFE after ten");
+    assert_eq!(sensor.scan((0..60_000).map(|_| 3_156)), 0);
+    assert!(sensor.scan((0..2_000).map(|_| 3_156)) > 900);
 }

@@ -121,11 +121,26 @@ impl<const SLOTS: usize> Bench<SLOTS> {
         self.scan_port(0, set);
     }
 
-    /// Runs a scan of the port with this index.
+    /// Runs a scan, in which the inputs of the port with this index change.
     fn scan_port(&mut self, index: usize, set: impl FnOnce(&mut modio_drivers::Channels)) {
-        let mut channels = *self.device.points.ports()[index].channels();
-        set(&mut channels);
-        self.device.scanned(index, &channels, true, 1);
+        let mut channels = self
+            .device
+            .points
+            .ports()
+            .each_ref()
+            .map(|port| *port.channels());
+        set(&mut channels[index]);
+        for (slot, channels) in channels.iter().enumerate() {
+            self.device.scanned(slot, channels, &[None; 4], true, 1);
+        }
         (0..SLOTS).for_each(|slot| self.device.run_links(slot));
+    }
+
+    /// Runs scans for this time.
+    fn pass(&mut self, ms: u32) {
+        for _ in 0..ms {
+            self.device.tick(1);
+            self.scan_port(0, |_| {});
+        }
     }
 }
