@@ -4,6 +4,8 @@
 #                        and the other inputs as with nothing connected. Every reset drives $dip again, so
 #                        set $dip to move the switch.
 #   modio_board NAME     selects the board: modio-02 or modio-08
+#   modio_load PLAIN     loads $image into slot A; with true nothing, because $elf runs without a loader. Settings
+#                        are stored where that image has them
 #   modio_input PORT CHANNEL LEVEL
 #                        drives a line of a slot: false energises an input of a 4DI
 #   modio_preset MODULE  stores MODULE for the first slot, if nothing is stored yet; several slots as
@@ -11,14 +13,15 @@
 #   modio_log            prints the part of the firmware's log that is in its buffer
 #   modio_quiet          disables meaningless warnings in Renode's log
 
-# Differences between the boards. sw01: port and pin, position 1 first. lines: those of the slots, by port. store:
-# address of the configuration's first page, and bytes of both pages.
+# Differences between the boards. sw01: port and pin, position 1 first. lines: those of the slots, by port. ram: its
+# bytes. store: address of the configuration's first page behind a loader and without one, and bytes of both pages.
 MODIO_BOARDS = {
     "modio-02": {
         "sw01": [("A", 4), ("A", 5), ("A", 6), ("A", 7), ("B", 12), ("B", 13), ("B", 14), ("B", 15)],
         "lines": {5: [("A", 0), ("A", 1), ("A", 2), ("A", 3)]},
         "aux": ("B", 5),
-        "store": (0x0800F800, 2048),
+        "ram": 0x5000,
+        "store": (0x0801F800, 0x0800F800, 2048),
     },
     "modio-08": {
         "sw01": [("C", 6), ("C", 7), ("C", 8), ("C", 9), ("B", 12), ("B", 13), ("B", 14), ("B", 15)],
@@ -29,15 +32,16 @@ MODIO_BOARDS = {
             4: [("B", 0), ("B", 1), ("C", 4), ("C", 5)],
         },
         "aux": ("C", 12),
-        "store": (0x0803F000, 4096),
+        "ram": 0xC000,
+        "store": (0x0803F000, 0x0803F000, 4096),
     },
 }
 
 # The modules in the order of their codes. `cargo xtask docs` writes the list.
 MODIO_MODULES = ["none", "4di", "4do", "2relay", "4ai", "4ao", "2ai2ao"]
 
-# The board of the machine.
-MODIO_MACHINE = {"board": "modio-02"}
+# The board of the machine, and whether its image runs without a loader.
+MODIO_MACHINE = {"board": "modio-02", "plain": False}
 
 
 def modio_board():
@@ -48,6 +52,17 @@ def mc_modio_board(board):
     if str(board) not in MODIO_BOARDS:
         raise ValueError("there is no board %s; use %s" % (board, ", ".join(sorted(MODIO_BOARDS))))
     MODIO_MACHINE["board"] = str(board)
+
+
+def modio_is_true(value):
+    # The monitor has its own truth values.
+    return str(value).lower() == "true"
+
+
+def mc_modio_load(plain):
+    MODIO_MACHINE["plain"] = modio_is_true(plain)
+    if not MODIO_MACHINE["plain"] and not monitor.Parse("sysbus LoadBinary $image 0x08004000"):
+        raise ValueError("the image of slot A cannot be loaded")
 
 
 def modio_drive(place, high):
@@ -71,7 +86,7 @@ def mc_modio_input(port, channel, high):
     lines = modio_board()["lines"]
     if int(port) not in lines or not 1 <= int(channel) <= 4:
         raise ValueError("there is no channel %s of port %s" % (channel, port))
-    modio_drive(lines[int(port)][int(channel) - 1], str(high).lower() == "true")
+    modio_drive(lines[int(port)][int(channel) - 1], modio_is_true(high))
 
 
 def modio_slots(modules):
@@ -110,7 +125,8 @@ def mc_modio_preset(modules):
     crc = modio_crc32(record)
     page = modio_halves([0x6B6F]) + record + modio_halves([crc & 0xFFFF, crc >> 16, 0, 0])
     sysbus = monitor.Machine["sysbus"]
-    store, size = modio_board()["store"]
+    slots_store, plain_store, size = modio_board()["store"]
+    store = plain_store if MODIO_MACHINE["plain"] else slots_store
     if any(sysbus.ReadDoubleWord(store + at) != 0xFFFFFFFF for at in range(0, size, 4)):
         return
     for at in range(len(page)):
@@ -129,10 +145,11 @@ def mc_modio_quiet():
 
 def mc_modio_log():
     sysbus = monitor.Machine["sysbus"]
-    # RTT's control block: 24 bytes of header, then channel 0: name, buffer, size, written, read, flags.
-    block = sysbus.GetSymbolAddress("_SEGGER_RTT")
-    start, length, written = [sysbus.ReadDoubleWord(block + at) for at in (28, 32, 36)]
-    if length > 4096 or written >= length:
-        print("the firmware has not opened its log")
-        return
-    print("".join(chr(sysbus.ReadByte(start + at)) for at in range(written)))
+    # RTT's control block, found by its mark "SEGGER RTT" as other viewers do: no symbols of the image in a slot are
+    # loaded. After 24 bytes follows channel 0: name, buffer, size, written, read, flags.
+    for block in range(0x20000000, 0x20000000 + modio_board()["ram"] - 40, 4):
+        if [sysbus.ReadDoubleWord(block + at) for at in (0, 4, 8)] == [0x47474553, 0x52205245, 0x00005454]:
+            start, length, written = [sysbus.ReadDoubleWord(block + at) for at in (28, 32, 36)]
+            print("".join(chr(sysbus.ReadByte(start + at)) for at in range(written)))
+            return
+    print("the firmware has not opened its log")

@@ -27,7 +27,9 @@ from Antmicro.Renode.Time import TimeInterval
 LINE_LONGEST = 1048576
 # Longest virtual time that one request may take.
 LINE_MOST_NS = 600000000000
-# Virtual time from power-on until the unit answers.
+# Virtual time of the first start of all, in which the loader verifies the image and resets, and of every other start
+# until the unit answers.
+LINE_FIRST_START_NS = 1500000000
 LINE_START_NS = 500000000
 
 # Bits per character of each format. Renode's UART has no parity, so 8E1 and 8O1 are missing.
@@ -389,6 +391,10 @@ class LineServer(object):
         """Lets the unit start, then accepts clients. Ends after ten failures to accept in a row."""
         try:
             clock = self.unit.clock
+            clock.run_until(clock.now + LINE_FIRST_START_NS)
+            # A client meets a unit that has been switched on, not one that has reset itself.
+            self.unit.power_off()
+            self.unit.power_on()
             clock.run_until(clock.now + LINE_START_NS)
         except:
             # Every request that lets time pass fails for the same reason and reports it.

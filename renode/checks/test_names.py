@@ -2,9 +2,9 @@
 
 import re
 import unittest
+from pathlib import Path
 
-from renode_fake import RENODE
-
+RENODE = Path(__file__).resolve().parent.parent
 SCRIPTS = sorted(RENODE.glob("*.resc"))
 SUITES = sorted([*RENODE.glob("tests/**/*.robot"), *RENODE.glob("tests/*.resource")])
 
@@ -31,6 +31,11 @@ class Names(unittest.TestCase):
         defined = found(r"def mc_(\w+)\(", [RENODE / "commands.py", RENODE / "exact-line.py"])
         self.assertTrue(used)
         self.assertLessEqual(used, defined)
+
+    def test_every_board_has_its_differences(self):
+        boards = {file.name.replace("-board.resc", "") for file in RENODE.glob("*-board.resc")}
+        for file in ("commands.py", "tests/boards.py"):
+            self.assertEqual(found(r'(?m)^    "([\w-]+)": [({]', [RENODE / file]), boards, file)
 
     def test_every_device_is_on_the_platform(self):
         own = found(r"(?m)^(\w+):", sorted(RENODE.glob("*.repl")))

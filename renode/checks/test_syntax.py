@@ -1,10 +1,11 @@
 """Checks that the scripts for Renode use only what Python 2.7 and Python 3 share: Renode runs them in
-IronPython 2, and these tests run them in Python 3."""
+IronPython 2, and these tests parse them in Python 3."""
 
 import ast
 import unittest
+from pathlib import Path
 
-from renode_fake import RENODE
+RENODE = Path(__file__).resolve().parent.parent
 
 # Syntax that Python 2.7 does not have, or interprets differently.
 REFUSED = {

@@ -50,9 +50,3 @@ def path_token(path):
 def number(text):
     """Returns the output of a monitor command as a number."""
     return int(text.strip(), 0)
-
-
-def text_of(words, length):
-    """Returns the text in the first `length` bytes of words that the monitor has printed."""
-    data = b"".join(number(word).to_bytes(4, "little") for word in words)
-    return data[: int(length)].decode("utf-8")

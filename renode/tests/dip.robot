@@ -32,7 +32,14 @@ An Invalid Address Silences The Unit And Blinks The Fault LED
     [Template]    Is Silent And Blinks
     0
     248
-    254
+
+Position 254 Selects Recovery Mode Behind A Loader
+    Start Board    dip=254
+    IF    "${PLAIN}" == "true"
+        Is Silent And Blinks    254
+    ELSE
+        Unit Answers    255
+    END
 
 A New Switch Position Takes Effect At The Next Power-On
     Start Board    dip=5

@@ -89,7 +89,7 @@ enum Command {
     Bench(bench::Options),
     /// Build all files of a release: loader, signed images, programs, bills of materials, check sums
     Dist(dist::Options),
-    /// Test the image on Renode: its suites and the conformance suite
+    /// Test loader and image on Renode: its suites and the conformance suite
     Renode(renode::Options),
     /// Test a real board on its serial line: conformance, timing, wires
     #[command(disable_help_flag = true)]

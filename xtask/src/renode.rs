@@ -1,5 +1,5 @@
-//! `cargo xtask renode`: the image on Renode, an emulator of other authors: its own suites, then the conformance suite
-//! with every module, in virtual time. `--interactive` starts the board for a person.
+//! `cargo xtask renode`: loader and image on Renode, an emulator of other authors: its own suites, then the conformance
+//! suite with every module, in virtual time. `--interactive` starts the board for a person.
 //!
 //! Only this command needs Renode. [`checks`], a step of `cargo xtask test`, checks Renode's files without it, and
 //! `cargo xtask sim` uses the project's own simulator.
@@ -8,11 +8,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use fs_err as fs;
+use register_map::update::Slot;
 use register_map::{Board, Module};
 use serde_json::json;
 
 use crate::workspace::Workspace;
-use crate::{build, steps};
+use crate::{build, signed, steps};
 
 pub mod checks;
 mod find;
@@ -34,6 +35,10 @@ const DIRECTORY: &str = "renode";
 pub struct Options {
     #[command(flatten)]
     given: build::Given,
+
+    /// Run the image that runs without a loader. `--elf` runs such an image, too
+    #[arg(long)]
+    plain: bool,
 
     /// The program renode, or its directory [default: the PATH, the usual places]
     #[arg(long, value_name = "PATH", env = "RENODE", hide_env_values = true)]
@@ -63,12 +68,14 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     let renode = Renode::find(options.renode.as_deref())?;
     eprintln!("Renode {} at {}", renode.version, renode.program.display());
     let board = options.given.board();
+    let (elf, image) = options.firmware(workspace)?;
     let bench = Bench {
         directory: workspace.root.join(DIRECTORY),
         output: workspace.target.join("renode").join(board.name),
         board,
         renode,
-        elf: options.given.elf(workspace)?,
+        elf,
+        image,
     };
     if options.interactive {
         return live::interact(&bench, options.module, options.dip, options.port);
@@ -76,6 +83,20 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     let conformance = workspace.program("modio-conformance")?;
     let python = checks::python(workspace)?;
     bench.run(&conformance, &python)
+}
+
+impl Options {
+    /// Returns the ELF file of the loader and the signed image for slot A, or the ELF file of the image that runs without
+    /// a loader. Builds them unless an option names that image.
+    fn firmware(&self, workspace: &mut Workspace) -> Result<(PathBuf, Option<PathBuf>)> {
+        if self.plain || self.given.is_given() {
+            return Ok((self.given.elf(workspace)?, None));
+        }
+        let board = self.given.board();
+        let loader = build::loader(workspace, board)?;
+        let image = signed::image(workspace, &signed::Options::of(board), Slot::A)?;
+        Ok((loader, Some(image)))
+    }
 }
 
 /// Everything that a run in Renode needs.
@@ -86,7 +107,10 @@ struct Bench {
     output: PathBuf,
     board: &'static Board,
     renode: Renode,
+    /// The loader, or the image that runs without one.
     elf: PathBuf,
+    /// The signed image for slot A, if there is a loader.
+    image: Option<PathBuf>,
 }
 
 impl Bench {

@@ -80,12 +80,7 @@ const STEPS: [(In, &str, &str, Run); 22] = [
     (Test, "modioctl", "modioctl on the simulator", Once(tool)),
     (Test, "pymodbus", "pymodbus and mbpoll", Once(masters)),
     (Test, "page", "the simulator's page", Once(page)),
-    (
-        Test,
-        "renode",
-        "files for Renode",
-        EachOfModio(checks::files),
-    ),
+    (Test, "renode", "files for Renode", Once(checks::files)),
     (Ci, "sim-slow", "sim, slow corner", Once(sim_slow)),
     (Ci, "sim-fast", "sim, fast corner", Once(sim_fast)),
     (

@@ -31,8 +31,8 @@ pub struct Given<'a> {
     pub allow_config: bool,
 }
 
-/// Number of requests without a reply after which a unit counts as silent.
-const ATTEMPTS: u32 = 4;
+/// How long a unit may be silent before its first answer, such as a unit that starts.
+const FIRST_ANSWER: Duration = Duration::from_secs(3);
 
 /// Every function that cases are about.
 pub const FUNCTIONS: [u8; 18] = [
@@ -55,53 +55,69 @@ pub fn probe(endpoint: &mut dyn Endpoint, given: &Given<'_>) -> Result<Target> {
         modio: None,
         ping: vec![8, 0, 0, 0xA5, 0x37],
     };
-    let line = endpoint.line();
-    if let Some(profile) = given.profile {
+    let (line, unit) = (endpoint.line(), given.unit);
+    let listed = given.profile.and_then(|profile| profile.functions.as_ref());
+    if let Some(listed) = listed {
+        let support = |function| match listed.contains(&function) {
+            true => Support::Yes,
+            false => Support::Refused,
+        };
+        target.functions = FUNCTIONS
+            .map(|function| (function, support(function)))
+            .into();
+    }
+    let first = if let Some(profile) = given.profile {
         let known = profile.known()?;
         target.readable = known.readable;
         (target.bits, target.words) = (known.bits, known.words);
+        // Without a list of functions a unit may be silent to an echo.
+        ping(&target, |function| match listed {
+            Some(_) => target.has(function),
+            None => function != 8,
+        })
     } else {
-        let reply = first_answer(endpoint, &target, &pdu(3, state::PRODUCT_CODE, 2))?;
+        Some(pdu(3, state::PRODUCT_CODE, 2))
+    };
+    let reply = match &first {
+        Some(first) => Some(first_answer(endpoint, &target, first)?),
+        None => None,
+    };
+    ensure!(
+        reply != Some(Reply::Silence),
+        "unit {unit} does not answer at {line}: check its address, rate, format, mode and wiring"
+    );
+    if given.profile.is_none() {
         let product = state::PRODUCT.to_be_bytes();
-        let unit = given.unit;
-        match reply {
-            Reply::Pdu(reply) if reply.get(2..) == Some(&product) => {}
-            Reply::Silence => bail!(
-                "unit {unit} does not answer at {line}: check its address, rate, format, mode and wiring"
-            ),
-            Reply::Wrong(..) => bail!(
+        match &reply {
+            Some(Reply::Pdu(reply)) if reply.get(2..) == Some(&product) => {}
+            Some(reply @ Reply::Wrong(..)) => bail!(
                 "the reply at {line} is not a Modbus frame ({reply}): check rate, format and mode"
             ),
-            Reply::Pdu(_) => {
-                bail!("unit {unit} answers but is not a modio: describe it with --profile FILE")
-            }
+            _ => bail!("unit {unit} answers but is not a modio: describe it with --profile FILE"),
         }
         target = modio(&mut Bench::new(endpoint, &target))?;
     }
-    for function in FUNCTIONS {
-        let listed = given.profile.and_then(|profile| profile.functions.as_ref());
-        let support = match listed {
-            Some(listed) if listed.contains(&function) => Support::Yes,
-            Some(_) => Support::Refused,
-            None => {
-                let request = harmless(&target, function)?;
-                match ask(endpoint, &target, &request)? {
-                    Reply::Silence => Support::Silent,
-                    reply if reply.exception(function) == Some(1) => Support::Refused,
-                    _ => Support::Yes,
-                }
-            }
-        };
-        target.functions.insert(function, support);
+    if listed.is_none() {
+        for function in FUNCTIONS {
+            let request = harmless(&target, function)?;
+            let support = match ask(endpoint, &target, &request)? {
+                Reply::Silence => Support::Silent,
+                reply if reply.exception(function) == Some(1) => Support::Refused,
+                _ => Support::Yes,
+            };
+            target.functions.insert(function, support);
+        }
     }
-    target.ping = ping(&target).context(
+    target.ping = ping(&target, |function| target.has(function)).context(
         "no request is known that the unit answers: name something to read in the profile",
     )?;
-    let reply = ask(endpoint, &target, &target.ping)?;
+    let reply = match reply {
+        Some(reply) if first.as_ref() == Some(&target.ping) => reply,
+        _ => ask(endpoint, &target, &target.ping)?,
+    };
     ensure!(
         matches!(&reply, Reply::Pdu(pdu) if pdu[0] == target.ping[0]),
-        "unit {} at {line} does not answer an ordinary request: the reply is {reply}",
-        given.unit
+        "unit {unit} at {line} does not answer an ordinary request: the reply is {reply}"
     );
     Ok(target)
 }
@@ -110,17 +126,20 @@ fn ask(endpoint: &mut dyn Endpoint, target: &Target, pdu: &[u8]) -> Check<Reply>
     Bench::new(endpoint, target).ask_due(pdu)
 }
 
-/// Asks a unit that may be starting, or may still have earlier bytes in its receiver.
+/// Asks a unit that may be starting, or may still have earlier bytes in its receiver. Repeats the request until the unit
+/// answers. The last request is sent after [`FIRST_ANSWER`].
 fn first_answer(endpoint: &mut dyn Endpoint, target: &Target, pdu: &[u8]) -> Check<Reply> {
     let silence = target.patience.silence;
-    for _ in 0..ATTEMPTS - 1 {
-        if let reply @ Reply::Pdu(_) = ask(endpoint, target, pdu)? {
+    let started = endpoint.now() + FIRST_ANSWER;
+    loop {
+        let is_last = endpoint.now() >= started;
+        let reply = ask(endpoint, target, pdu)?;
+        if is_last || matches!(reply, Reply::Pdu(_)) {
             return Ok(reply);
         }
         // Discard a late reply, so that it is not read as the reply to the next request.
         endpoint.receive(silence, silence, usize::MAX)?;
     }
-    ask(endpoint, target, pdu)
 }
 
 /// Returns a request that shows whether the unit has a function, and changes nothing.
@@ -145,12 +164,12 @@ fn harmless(target: &Target, function: u8) -> Result<Vec<u8>> {
     })
 }
 
-/// Returns an ordinary request: a short read, else an echo.
-fn ping(target: &Target) -> Option<Vec<u8>> {
+/// Returns an ordinary request to a unit that `has` these functions: a short read, else an echo.
+fn ping(target: &Target, has: impl Fn(u8) -> bool) -> Option<Vec<u8>> {
     let read = (1..=4)
-        .filter(|function| target.has(*function))
+        .filter(|function| has(*function))
         .find_map(|function| Some(pdu(function, target.readable(function).first()?.first, 1)));
-    read.or_else(|| target.has(8).then(|| vec![8, 0, 0, 0xA5, 0x37]))
+    read.or_else(|| has(8).then(|| vec![8, 0, 0, 0xA5, 0x37]))
 }
 
 /// Reads from a modio's registers what the modio has, and how much longer than t3.5 its reply may take.

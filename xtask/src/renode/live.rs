@@ -94,12 +94,16 @@ fn reason(log: &Path) -> String {
     reason.unwrap_or_else(|| "its log is empty".to_owned())
 }
 
-/// Writes the script that sets image and board, and then includes the script of the board with this kind of line:
+/// Writes the script that sets images and board, and then includes the script of the board with this kind of line:
 /// `-exact` for the exact-line protocol, or nothing for the socket of a person.
 fn write_script(bench: &Bench, line: &str, module: Module, dip: u8, port: u16) -> Result<PathBuf> {
     let script = bench.output.join("run.resc");
+    let image = bench.image.as_deref();
+    let image = image.map_or("$plain=true".to_owned(), |image| {
+        format!("$image={}", token(image))
+    });
     let text = format!(
-        "$elf={}\n$dip={dip}\n$module=\"{module}\"\n$port={port}\ninclude {}\n",
+        "$elf={}\n{image}\n$dip={dip}\n$module=\"{module}\"\n$port={port}\ninclude {}\n",
         token(&bench.elf),
         token(&bench.directory.join(format!("{}{line}.resc", bench.board))),
     );

@@ -101,26 +101,32 @@ fn pins_are_those_of_the_board() {
 }
 
 #[test]
-fn commands_know_where_the_configuration_is() {
+fn commands_know_the_memory_of_the_board() {
     for board in MODIO {
-        let store = board.store;
-        let (first, bytes) = (store.first, 2 * store.bytes);
-        assert_has(
-            "commands.py",
-            &format!("        \"store\": ({first:#010X}, {bytes}),").replace("0X", "0x"),
+        let (layout, ram) = (board.layout(), board.memory().part.ram);
+        let (store, plain) = (layout.store.first, board.store.first);
+        let bytes = 2 * layout.store.bytes;
+        let memory = format!(
+            "        \"ram\": 0x{ram:X},\n        \"store\": (0x{store:08X}, 0x{plain:08X}, {bytes}),\n"
         );
+        assert_has("commands.py", &memory);
+        let [a, _] = layout.slots;
+        assert_has("commands.py", &format!("LoadBinary $image 0x{a:08X}\""));
     }
 }
 
 #[test]
-fn scripts_name_files_that_exist_and_the_image_that_is_built() {
+fn scripts_name_files_that_exist_and_the_images_that_are_built() {
     for board in MODIO {
-        let elf = build::target(Path::new("../target"), board);
-        let elf = elf.join(TARGET).join(build::PROFILE).join("modio");
+        let built = build::target(Path::new("../target"), board);
+        let built = built.join(TARGET).join(build::PROFILE);
+        let [loader, image] = ["loader", "modio-a.image"].map(|name| {
+            // Renode's scripts have slashes on every system.
+            built.join(name).display().to_string().replace('\\', "/")
+        });
         assert_has(
             &format!("{board}-board.resc"),
-            // Renode's scripts have slashes on every system.
-            &format!("$elf?=$ORIGIN/{}\n", elf.display()).replace('\\', "/"),
+            &format!("$elf?=$ORIGIN/{loader}\n$image?=$ORIGIN/{image}\n"),
         );
         for kind in ["", "-exact", "-pty"] {
             let script = format!("{board}{kind}.resc");

@@ -19,6 +19,11 @@ pub fn run(bench: &Bench, python: &Path) -> Result<()> {
     let mut tester = Command::new(bench.renode.tester()?);
     tester.arg("-r").arg(&output);
     tester.args(["--variable", &format!("ELF:{}", bench.elf.display())]);
+    let image = match &bench.image {
+        Some(image) => format!("IMAGE:{}", image.display()),
+        None => "PLAIN:true".to_owned(),
+    };
+    tester.args(["--variable", &image]);
     tester.args(["--variable", &format!("BOARD_NAME:{}", bench.board)]);
     tester.args(all(&bench.directory, bench.board)?);
     let status = Group::start(tester)?.wait(Duration::MAX)?;
@@ -52,7 +57,7 @@ fn to_junit(python: &Path, results: &Path, to: &Path) -> Result<()> {
 
 /// Returns the suites for a board, in the order of their names: those in tests, which are for any board, and those in
 /// the directory there with the name of the board.
-pub fn all(directory: &Path, board: &Board) -> Result<Vec<PathBuf>> {
+fn all(directory: &Path, board: &Board) -> Result<Vec<PathBuf>> {
     let tests = directory.join("tests");
     // A board need not have separate suites.
     let of_board = fs::read_dir(tests.join(board.name)).into_iter().flatten();

@@ -50,20 +50,30 @@ impl Fake {
             output: self.at("output with a space"),
             board: &register_map::board::MODIO_08,
             renode: self.find().unwrap(),
-            elf: self.at("modio"),
+            elf: self.at("loader"),
+            image: Some(self.at("modio-a.image")),
         };
         fs::create_dir_all(&bench.output).unwrap();
         bench
     }
 
-    fn suites(&self, rebot: &str) -> Result<()> {
-        self.program("python", rebot);
-        suites::run(&self.bench(), &self.at("python"))
+    /// The same with the image that runs without a loader.
+    fn plain(&self) -> Bench {
+        Bench {
+            elf: self.at("modio"),
+            image: None,
+            ..self.bench()
+        }
     }
 
-    fn conformance(&self, script: &str) -> Result<()> {
+    fn suites(&self, bench: &Bench, rebot: &str) -> Result<()> {
+        self.program("python", rebot);
+        suites::run(bench, &self.at("python"))
+    }
+
+    fn conformance(&self, bench: &Bench, script: &str) -> Result<()> {
         self.program("conformance", script);
-        live::conformance(&self.bench(), Module::Do4, &self.at("conformance"))
+        live::conformance(bench, Module::Do4, &self.at("conformance"))
     }
 
     fn calls(&self) -> Vec<String> {
@@ -113,13 +123,19 @@ fn old_or_broken_renode_is_refused() {
 #[test]
 fn suites_run_with_image_and_board_and_their_end_is_reported() {
     let fake = Fake::new();
-    fake.suites(r#"[ "$3" = robot.rebot ] || exit 252; echo "rebot $*" >> "$CALLS""#)
-        .unwrap();
+    let rebot = r#"[ "$3" = robot.rebot ] || exit 252; echo "rebot $*" >> "$CALLS""#;
+    fake.suites(&fake.bench(), rebot).unwrap();
+    fake.suites(&fake.plain(), rebot).unwrap();
     let calls = fake.calls();
-    let elf = format!("ELF:{} ", fake.at("modio").display());
+    let at = |name| fake.at(name).display().to_string();
+    let (loader, image) = (at("loader"), at("modio-a.image"));
+    let loaded = format!(" --variable ELF:{loader} --variable IMAGE:{image} ");
+    let plain = format!(" --variable ELF:{} --variable PLAIN:true ", at("modio"));
     let parts = "BOARD_NAME:modio-08 tests/boot.robot modio-08/slots.robot";
-    for part in parts.split(' ').chain([elf.as_str()]) {
-        assert!(calls[0].contains(part), "{part}: {}", calls[0]);
+    for (call, images) in [(&calls[0], &loaded), (&calls[2], &plain)] {
+        for part in parts.split(' ').chain([images.as_str()]) {
+            assert!(call.contains(part), "{part}: {call}");
+        }
     }
     assert!(calls[1].ends_with("robot_output.xml"), "{}", calls[1]);
     for (test, rebot, expected) in [
@@ -129,18 +145,19 @@ fn suites_run_with_image_and_board_and_their_end_is_reported() {
         ("exit 5", "exit 0", "status Some(5)"),
     ] {
         fake.program("renode-test", test);
-        let text = message(fake.suites(rebot));
+        let text = message(fake.suites(&fake.bench(), rebot));
         assert!(text.contains(expected), "{text}");
     }
     fs::remove_file(fake.at("renode-test")).unwrap();
-    assert!(message(fake.suites("exit 0")).contains("no renode-test beside"));
+    let text = message(fake.suites(&fake.bench(), "exit 0"));
+    assert!(text.contains("no renode-test beside"), "{text}");
 }
 
 #[test]
 fn conformance_suite_runs_against_the_board_in_renode() {
     let fake = Fake::new();
-    fake.conformance(r#"echo "conformance $*" >> "$CALLS""#)
-        .unwrap();
+    let note = r#"echo "conformance $*" >> "$CALLS""#;
+    fake.conformance(&fake.bench(), note).unwrap();
     let calls = fake.calls();
     let [renode, conformance, monitor] = calls.as_slice() else {
         panic!("{calls:?}");
@@ -151,13 +168,21 @@ fn conformance_suite_runs_against_the_board_in_renode() {
         assert!(conformance.contains(part), "{conformance}");
     }
     assert_eq!(monitor, "monitor quit");
-    let script = fs::read_to_string(fake.at("calls.resc")).unwrap();
+    let script = || fs::read_to_string(fake.at("calls.resc")).unwrap();
+    let loaded = script();
     let port = conformance.split([':', ' ']).nth(3).unwrap();
-    let elf = fake.at("modio").display().to_string();
-    let expected = format!("$elf=@{elf}\n$dip=1\n$module=\"4do\"\n$port={port}\ninclude @");
-    assert!(script.starts_with(&expected), "{script}");
-    assert!(script.ends_with("renode/modio-08-exact.resc\n"), "{script}");
-    let text = message(fake.conformance("exit 1"));
+    let at = |name| fake.at(name).display().to_string();
+    let (loader, image) = (at("loader"), at("modio-a.image"));
+    let expected = format!(
+        "$elf=@{loader}\n$image=@{image}\n$dip=1\n$module=\"4do\"\n$port={port}\ninclude @"
+    );
+    assert!(loaded.starts_with(&expected), "{loaded}");
+    assert!(loaded.ends_with("renode/modio-08-exact.resc\n"), "{loaded}");
+
+    fake.conformance(&fake.plain(), note).unwrap();
+    let expected = format!("$elf=@{}\n$plain=true\n$dip=1\n", at("modio"));
+    assert!(script().starts_with(&expected), "{}", script());
+    let text = message(fake.conformance(&fake.bench(), "exit 1"));
     assert_eq!(text, "cases failed");
 }
 
@@ -166,11 +191,13 @@ fn renode_that_does_not_start_or_dies_is_a_failure_even_if_all_cases_passed() {
     let fake = Fake::new();
     let start = "[ \"$1\" = --version ] || echo $$ > \"$CALLS.pid\"";
     fake.program("renode", &format!("{start}\n{RENODE}"));
-    let text = message(fake.conformance("kill -KILL $(cat \"$CALLS.pid\"); sleep 0.5"));
+    let bench = fake.bench();
+    let kill = "kill -KILL $(cat \"$CALLS.pid\"); sleep 0.5";
+    let text = message(fake.conformance(&bench, kill));
     assert!(text.starts_with("Renode ended before"), "{text}");
     let no_type = "echo 'Renode v1.16.1'; echo 'Error E25: no such type'; echo bye";
     fake.program("renode", no_type);
-    let text = message(fake.conformance("echo tried >> \"$CALLS\""));
+    let text = message(fake.conformance(&bench, "echo tried >> \"$CALLS\""));
     let expected = "Renode does not start the board: Error E25: no such type";
     assert_eq!(text, expected);
     assert!(!fake.calls().contains(&"tried".to_owned()));

@@ -39,6 +39,12 @@ impl Reference {
         }
     }
 
+    /// A unit that was switched on this long before it answers.
+    pub fn starting_for(mut self, time: Duration) -> Self {
+        self.starts = Some(self.now + time);
+        self
+    }
+
     /// A unit that counts characters of the line's format for t1.5 and t3.5.
     pub fn counting_own_characters(mut self) -> Self {
         self.unit.own_characters = true;

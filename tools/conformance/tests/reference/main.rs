@@ -11,11 +11,13 @@ mod server;
 mod unit;
 
 use std::collections::BTreeSet;
+use std::time::Duration;
 
 use conformance::bench::Bench;
 use conformance::case::{Case, Kind, Need};
 use conformance::cases::all;
 use conformance::cli::waits;
+use conformance::endpoint::Endpoint as _;
 use conformance::frame::Mode;
 use conformance::probe::{Given, probe};
 use conformance::profile::Profile;
@@ -73,7 +75,13 @@ fn outcomes(
 
 /// Asks the unit of this profile, or the modio.
 fn probed(endpoint: &mut Reference, mode: Mode, profile: Option<&Profile>) -> Target {
-    let given = Given {
+    let given = given(endpoint, mode, profile);
+    probe(endpoint, &given).unwrap()
+}
+
+/// What a user gives to have the unit of this profile tested, or the modio.
+fn given<'a>(endpoint: &Reference, mode: Mode, profile: Option<&'a Profile>) -> Given<'a> {
+    Given {
         unit: profile
             .map_or(Some(modio::UNIT), |profile| profile.unit)
             .unwrap(),
@@ -81,8 +89,7 @@ fn probed(endpoint: &mut Reference, mode: Mode, profile: Option<&Profile>) -> Ta
         patience: waits(endpoint, None),
         profile,
         allow_config: profile.is_none(),
-    };
-    probe(endpoint, &given).unwrap()
+    }
 }
 
 fn assert_passes(endpoint: Reference, mode: Mode) -> Vec<&'static str> {
@@ -127,6 +134,30 @@ fn with_8n1_a_unit_passes_that_counts_characters_of_11_or_of_10_bits() {
 fn unit_that_is_silent_to_incomplete_writes_passes() {
     let unit = reference(None, Mode::Rtu, "8E1").silent_to_incomplete_writes();
     assert_passes(unit, Mode::Rtu);
+}
+
+#[test]
+fn unit_that_starts_is_waited_for_and_an_absent_one_is_an_error() {
+    let profile = Profile::parse(PROFILE).unwrap();
+    for profile in [None, Some(&profile)] {
+        let line = LineFormat::default();
+        let starting_for = |time| match profile {
+            None => Reference::modio(None, Mode::Rtu, line).starting_for(time),
+            Some(_) => Reference::new(None, Mode::Rtu, line).starting_for(time),
+        };
+        let mut late = starting_for(Duration::from_secs(2));
+        probed(&mut late, Mode::Rtu, profile);
+
+        let mut absent = starting_for(Duration::MAX / 2);
+        let begin = absent.now();
+        let given = given(&absent, Mode::Rtu, profile);
+        let error = probe(&mut absent, &given).unwrap_err().to_string();
+        let unit = given.unit;
+        let expected = format!("unit {unit} does not answer at 9600 8N2: check its address");
+        assert!(error.starts_with(&expected), "{error}");
+        let waited = absent.now() - begin;
+        assert!((3..4).contains(&waited.as_secs()), "{waited:?}");
+    }
 }
 
 #[test]
