@@ -3,12 +3,13 @@
 use std::ops::RangeInclusive;
 
 use register_map::codes::LinkAction;
-use register_map::configuration::{COMM_TIMEOUT, FILTER};
+use register_map::configuration::{BAUD, COMM_TIMEOUT, FILTER, SAFE};
 use register_map::links;
+use sim::line::{Format, Settings};
 use sim::{Module, Time};
 
 use crate::bench::Bench;
-use crate::fitted::{LINES, change, fitted};
+use crate::fitted::{LINES, change, fitted, outputs};
 use crate::saving::{SLOWEST, large};
 
 const MODULES: [Module; 4] = [Module::Do4, Module::Di4, Module::None, Module::Di4];
@@ -19,6 +20,9 @@ const BUTTONS: [u16; 2] = [4, 13];
 
 /// From an edge of an input to that of the output, in us: 0 to 1 ms until the scan, and the scan's work.
 const ON_TIME: RangeInclusive<u64> = 0..=2_000;
+
+/// Time after a power-on after which the inputs have values.
+const READY: Time = Time::from_ms(1_200);
 
 /// Returns settings by which both inputs, without debounce, switch the output.
 fn linked(action: LinkAction) -> Vec<(u16, u16)> {
@@ -51,6 +55,7 @@ fn press(bench: &mut Bench, (port, channel): (u8, usize), pressed: bool) -> Opti
 #[ignore = "needs the image: cargo xtask test"]
 fn a_lamp_with_two_buttons_changes_within_2_ms() {
     let mut bench = fitted(MODULES, &linked(LinkAction::Toggle));
+    bench.board.run_for(READY);
     for n in 0..12 {
         // At any phase between two scans.
         bench.board.run_for(Time::from_us(n * 137));
@@ -68,7 +73,7 @@ fn output_follows_within_2_ms_while_the_line_is_dead() {
     let mut settings = linked(LinkAction::FollowAlone);
     settings.push((COMM_TIMEOUT, 1));
     let mut bench = fitted(MODULES, &settings);
-    bench.board.run_for(Time::from_ms(200));
+    bench.board.run_for(READY);
     for n in 0..8 {
         bench.board.run_for(Time::from_us(n * 137));
         let (took, level) = press(&mut bench, (2, 1), n % 2 == 0).unwrap();
@@ -86,8 +91,9 @@ fn output_follows_at_most_an_erase_later_during_a_save() {
     settings.extend(links);
     let mut bench = fitted(MODULES, &settings);
     bench.board.set_flash_durations(SLOWEST);
-    // START has switched the output on.
-    assert_eq!(press(&mut bench, (2, 1), true), None);
+    // START has switched the output on, until the inputs have values.
+    bench.board.run_for(READY);
+    press(&mut bench, (2, 1), true).unwrap();
     let mut longest = 0;
     for n in 0..16 {
         bench.configure(FILTER + 7, &[10 + n]);
@@ -98,4 +104,44 @@ fn output_follows_at_most_an_erase_later_during_a_save() {
         longest = longest.max(took);
     }
     assert!(longest > 20_000, "no erase: {longest} us");
+}
+
+/// Returns the edges of the output since the pin is watched.
+fn edges(bench: &Bench) -> usize {
+    let (line, pin) = LINES[0][3];
+    bench.board.pin_edges(line, pin).len()
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn pin_of_a_held_output_has_no_edge_while_a_master_writes_the_opposite_nor_at_a_trip() {
+    for action in [LinkAction::Follow, LinkAction::Invert] {
+        let mut settings = linked(action);
+        settings.extend([(BAUD, 1152), (COMM_TIMEOUT, 3)]);
+        if action == LinkAction::Follow {
+            // SAFE is the opposite of what the link wants, too.
+            settings.push((SAFE + LAMP, 1));
+        }
+        let mut bench = fitted(MODULES, &settings);
+        bench.settings(Settings {
+            baud: 115_200,
+            format: Format::N2,
+        });
+        bench.board.run_for(READY);
+        let on = outputs(&bench, 1)[3];
+        assert_eq!(on, action == LinkAction::Invert);
+        let (line, pin) = LINES[0][3];
+        bench.board.watch_pin(line, pin);
+        let before = edges(&bench);
+        let mut next = bench.board.now();
+        for n in 0..100 {
+            bench.write_bits(LAMP, &[!on]).unwrap();
+            // At any phase between two scans.
+            next += Time::from_us(20_000 + n * 7);
+            bench.board.run_until(next);
+        }
+        bench.board.run_for(Time::from_ms(1_000));
+        assert!(bench.status(1), "the watchdog has expired");
+        assert_eq!(edges(&bench), before, "{action:?}");
+    }
 }

@@ -25,7 +25,9 @@ mod digital;
 mod fast;
 mod faults_of_slots;
 mod fitted;
+mod kept_outputs;
 mod links;
+mod links_played;
 mod slots;
 
 #[allow(dead_code, reason = "other tests of the modio-02 use the rest")]
