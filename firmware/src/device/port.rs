@@ -125,6 +125,8 @@ impl IoPort {
     }
 
     /// Sets a digital output. This ends a pulse of the output.
+    // Inlined into the loop over the bits of a write.
+    #[inline(always)]
     pub(super) const fn set_output(&mut self, channel: usize, value: bool) {
         self.channels.set_bit(channel, value);
         self.pulsing &= !(1 << (channel & 7));

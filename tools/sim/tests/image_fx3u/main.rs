@@ -269,6 +269,8 @@ fn run_switch_moved_twice_after_power_on_starts_recovery() {
 fn button_switches_a_lamp_without_a_master() {
     let link = links::of_point(Y0.into(), false);
     let mut bench = unit(&[(link, 0), (link + 1, LinkAction::Toggle.code())]);
+    // After a power-on no button is seen for a second.
+    bench.board.run_for(Time::from_ms(1_100));
     for lit in [true, false] {
         for pressed in [true, false] {
             set(&mut bench, "X0", Value::Input(pressed));
