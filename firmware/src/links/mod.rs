@@ -1,7 +1,8 @@
 //! Links: inputs that switch digital outputs without a master.
 //!
-//! A level link (follow, invert) holds its output at what its source wants. An edge link (the others) acts at an edge of
-//! its source and at nothing else. An analog source has level links only:
+//! A level link (follow, invert) holds its output at what its source wants: it does not share the output with a master,
+//! as it did in images that were not released. An edge link (the others) shares it: it acts at an edge of its source and
+//! at nothing else. Toggle is for buttons, change for switches that are no buttons. An analog source has level links only:
 //!
 //! ```text
 //!   word   ______                  above HIGH: on with follow, off with invert

@@ -56,6 +56,7 @@ pub struct Cli {
 
 const LINK_HELP: &str = "\
 p1.1 toggles p2.1                                a button: each press inverts the output
+p1.1 toggles p2.1 at each edge                   a switch that is no button: each move inverts the output
 p1.1 sets p2.1, p1.1 resets p2.1                 a press switches the output on, off
 p1.1 pulses p2.1 for 90s                         a press switches the output on for 90 s
 p2.1 follows p1.1, p2.1 inverts p1.1             the output is as the input, or its opposite
@@ -64,8 +65,11 @@ p3.1 switches p2.1 on below 15.0 off above 18.0
 ... if alone                                     the link acts only while the master is gone
 none p2.1                                        deletes the links of the output
 
-An output has two links. The command writes the one that has this input, or else a free one. It is in force immediately; \
-`modioctl config save` keeps it.";
+An output has two links. The command writes the one that has this input, or else a free one. It acts a second later; \
+`modioctl config save` keeps it.
+
+`follows`, `inverts` and `switches` hold the output: while such a link acts, a write by a master has no effect. Use \
+`toggles` for an output that a master writes, too.";
 
 /// A command.
 #[derive(Subcommand, Debug)]

@@ -11,6 +11,7 @@ mod commands;
 mod device;
 pub mod export;
 pub mod failure;
+mod held;
 mod links;
 mod listing;
 mod monitor;

@@ -1,13 +1,16 @@
-//! Links of digital outputs, in the words of `modioctl link` and `modioctl links`, and in registers.
+//! Links of digital outputs, in the words of `modioctl link` and `modioctl links`, and in registers. With `follows`,
+//! `inverts` and `switches` an input holds the output, so a master's write to it has no effect; with the other words input
+//! and master share the output. `at each edge` is for a switch that is no button.
 //!
 //! ```text
 //! p1.1 toggles p2.1                                  p2.1 follows p1.1 if alone
-//! p1.1 pulses p2.1 for 90s                           p2.1 inverts p1.1
-//! p3.1 switches p2.1 on below 15.0 off above 18.0    p1.1 sets p2.1, p1.1 resets p2.1
+//! p1.1 toggles p2.1 at each edge                     p2.1 inverts p1.1
+//! p1.1 pulses p2.1 for 90s                           p1.1 sets p2.1, p1.1 resets p2.1
+//! p3.1 switches p2.1 on below 15.0 off above 18.0
 //! ```
 
 use modio_description::Unit;
-use register_map::codes::LinkAction;
+use register_map::codes::{LinkAction, Signal};
 use register_map::links::{NO_SOURCE, WORDS};
 
 use crate::failure::Failure;
@@ -108,6 +111,7 @@ fn in_words(book: &Book, output: &str, words: &[u16]) -> Option<String> {
             }
         }
         LinkAction::Toggle => format!("{name} toggles {output}"),
+        LinkAction::Change => format!("{name} toggles {output} at each edge"),
         LinkAction::Pulse => format!(
             "{name} pulses {output} for {}s",
             f64::from(time_or_high) / 10.0
@@ -142,8 +146,8 @@ pub struct Order {
     pub words: [u16; WORDS as usize],
 }
 
-const FORMS: &str = "a link is `INPUT toggles|sets|resets OUTPUT`, `INPUT pulses OUTPUT for 90s`, \
-`OUTPUT follows|inverts INPUT`, `INPUT switches OUTPUT on above HIGH off below LOW`, each also with `if alone`, or \
+const FORMS: &str = "a link is `INPUT toggles|sets|resets OUTPUT`, `INPUT toggles OUTPUT at each edge`, \
+`INPUT pulses OUTPUT for 90s`, `OUTPUT follows|inverts INPUT`, `INPUT switches OUTPUT on above HIGH off below LOW`, each also with `if alone`, or \
 `none OUTPUT`";
 
 /// Parses a link in words.
@@ -156,6 +160,7 @@ pub fn parse(book: &Book, text: &str) -> Result<Order, Failure> {
     let (source, verb, output, values) = match *sentence {
         [output, verb @ ("follows" | "inverts"), source] => (source, verb, output, &[][..]),
         [source, verb @ ("toggles" | "sets" | "resets"), output] => (source, verb, output, &[][..]),
+        [source, "toggles", output, "at", "each", "edge"] => (source, "changes", output, &[][..]),
         [source, verb @ "pulses", output, "for", ref time @ ..] => (source, verb, output, time),
         [source, verb @ "switches", output, ref limits @ ..] => (source, verb, output, limits),
         _ => return Err(Failure::usage(FORMS)),
@@ -166,6 +171,7 @@ pub fn parse(book: &Book, text: &str) -> Result<Order, Failure> {
         "follows" => (LinkAction::Follow, [0, 0]),
         "inverts" => (LinkAction::Invert, [0, 0]),
         "toggles" => (LinkAction::Toggle, [0, 0]),
+        "changes" => (LinkAction::Change, [0, 0]),
         "sets" => (LinkAction::Set, [0, 0]),
         "resets" => (LinkAction::Reset, [0, 0]),
         "pulses" => (LinkAction::Pulse, [time(&values.join(" "))?, 0]),
@@ -177,6 +183,28 @@ pub fn parse(book: &Book, text: &str) -> Result<Order, Failure> {
         output,
         links,
         words: [source.address, action, time_or_high, low],
+    })
+}
+
+/// Says what a link with an analog source does when the wire of the source breaks; `None` for any other link.
+pub fn note(book: &Book, order: &Order) -> Option<String> {
+    let [source, ..] = order.words;
+    let source = book.item(&point_name(source))?;
+    let Meaning::Analog(reading) = &source.meaning else {
+        return None;
+    };
+    let (name, output) = (&source.name, &order.output);
+    let wants_safe = format!("the link wants what {output}.safe says");
+    Some(match Signal::from_code(reading.range)? {
+        Signal::Voltage => format!(
+            "{name} is 0-10 V, which has no wire-break detection: for the link a cut wire is a voltage"
+        ),
+        Signal::Current => format!(
+            "while the loop of {name} is broken, {wants_safe}; a loop that fails high reads as above HIGH"
+        ),
+        Signal::Ntc => {
+            format!("while the sensor of {name} is cut or short-circuited, {wants_safe}")
+        }
     })
 }
 
@@ -272,6 +300,8 @@ mod tests {
         let link = book.find("p2.1.link1").unwrap();
         for (text, words) in [
             ("p1.1 toggles p2.1", [0, 3, 0, 0]),
+            ("p1.1 toggles p2.1 at each edge", [0, 7, 0, 0]),
+            ("p1.1 toggles p2.1 at each edge if alone", [0, 0x107, 0, 0]),
             ("p1.2 sets p2.1 if alone", [1, 0x105, 0, 0]),
             ("p1.2 resets p2.1", [1, 6, 0, 0]),
             ("p1.1 pulses p2.1 for 90s", [0, 4, 900, 0]),
@@ -319,7 +349,9 @@ mod tests {
         assert!(wrong("p1.1 toggles p3.1").contains("but an analog input"));
         assert!(wrong("BAUD toggles p2.1").contains("BAUD is no point"));
         assert!(wrong("p1.1 toggles p4.1").contains("no such point"));
-        assert!(wrong("p3.1 toggles p2.1").contains("use `p3.1 switches OUTPUT"));
+        for text in ["p3.1 toggles p2.1", "p3.1 toggles p2.1 at each edge"] {
+            assert!(wrong(text).contains("use `p3.1 switches OUTPUT"), "{text}");
+        }
         let digital = wrong("p1.1 switches p2.1 on above 1 off below 0");
         assert!(digital.contains("use `OUTPUT follows p1.1`"), "{digital}");
         let one_slot = names::book(&MODIO_02, Module::Do4, (0, 0));
@@ -334,6 +366,7 @@ mod tests {
             "p1.1",
             "p1.1 blinks p2.1",
             "p1.1 toggles p2.1 for 1s",
+            "p1.1 sets p2.1 at each edge",
             "p1.1 pulses p2.1",
         ] {
             assert!(wrong(text).contains("a link is `INPUT toggles"), "{text}");

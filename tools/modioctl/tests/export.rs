@@ -50,6 +50,21 @@ fn digital() -> Book {
     Book::new(describe(&MODIO_08, "0.1.0", module), vec![(0, 0); 32])
 }
 
+/// A modio-08 with inputs in port 1 and relays in port 2. A link holds the coil of relay 1.
+fn linked() -> Source {
+    let module = |port| match port {
+        1 => Module::Di4,
+        2 => Module::Relay2,
+        _ => Module::None,
+    };
+    let book = Book::new(describe(&MODIO_08, "0.1.0", module), vec![(0, 0); 32]);
+    let held = [("p2.3".to_owned(), vec!["p1.1".to_owned()])];
+    Source {
+        held: held.into(),
+        ..source(1, &book)
+    }
+}
+
 /// A modio-02 with this module.
 fn modio_02(module: Module) -> Book {
     Book::new(describe(&MODIO_02, "0.1.0", |_| module), vec![(0, 0); 32])
@@ -71,11 +86,7 @@ fn several(
 ) -> Result<String, String> {
     let units: Vec<_> = books
         .iter()
-        .map(|(unit, book)| Source {
-            unit: *unit,
-            book: (*book).clone(),
-            source: "this program's register map".to_owned(),
-        })
+        .map(|(unit, book)| source(*unit, book))
         .collect();
     let line = Line {
         name,
@@ -83,6 +94,16 @@ fn several(
         units: &units,
     };
     text(format, line).map_err(|failure| failure.to_string())
+}
+
+/// A unit without outputs that links hold.
+fn source(unit: u8, book: &Book) -> Source {
+    Source {
+        unit,
+        book: book.clone(),
+        source: "this program's register map".to_owned(),
+        held: Default::default(),
+    }
 }
 
 /// Reads an export.
@@ -112,17 +133,37 @@ fn texts_of(list: &[Json], key: &str) -> Vec<String> {
     list.iter().filter_map(text).collect()
 }
 
+/// Compares a text with a file in `tests/export/`.
+fn is_stored(text: &str, name: &str) {
+    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/export");
+    let path = directory.join(name);
+    if std::env::var_os("MODIOCTL_WRITE_EXPORTS").is_some() {
+        std::fs::write(&path, text).unwrap();
+    }
+    let stored = std::fs::read_to_string(&path).unwrap();
+    assert!(text == stored, "{name} differs from the export:\n{text}");
+}
+
 #[test]
 fn exports_equal_the_stored_files() {
-    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/export");
     for (format, name) in FORMATS {
-        let text = export(format, &analog(), &serial()).unwrap();
-        let path = directory.join(name);
-        if std::env::var_os("MODIOCTL_WRITE_EXPORTS").is_some() {
-            std::fs::write(&path, &text).unwrap();
-        }
-        let stored = std::fs::read_to_string(&path).unwrap();
-        assert!(text == stored, "{name} differs from the export:\n{text}");
+        is_stored(&export(format, &analog(), &serial()).unwrap(), name);
+    }
+}
+
+#[test]
+fn output_that_a_link_holds_is_a_sensor_that_nothing_writes() {
+    for (format, name) in [
+        (HomeAssistant, "linked-home-assistant.yaml"),
+        (Telegraf, "linked-telegraf.conf"),
+        (NodeRed, "linked-node-red.json"),
+    ] {
+        let line = Line {
+            name: None,
+            endpoint: &serial(),
+            units: &[linked()],
+        };
+        is_stored(&text(format, line).unwrap(), name);
     }
 }
 

@@ -37,6 +37,7 @@ fn flow(book: Book) -> Vec<Json> {
             unit: 1,
             book,
             source: String::new(),
+            held: Default::default(),
         }],
     };
     serde_json::from_str(&text(ExportFormat::NodeRed, line).unwrap()).unwrap()

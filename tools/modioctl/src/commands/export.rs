@@ -37,8 +37,10 @@ pub async fn run(device: &mut Device, options: &Export) -> Result<(), Failure> {
 async fn source(device: &mut Device) -> Result<Source, Failure> {
     let learned = fetch(device).await?;
     learned.book.of_modio()?;
+    let held = device.held(&learned.book, learned.book.points()).await?;
     Ok(Source {
         unit: device.unit,
+        held,
         book: learned.book,
         source: learned.source,
     })

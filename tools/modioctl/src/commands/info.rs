@@ -12,6 +12,7 @@ use serde_json::{Map, Value as Json, json};
 use crate::bus::{Lost, decode};
 use crate::device::{Device, fetch};
 use crate::failure::Failure;
+use crate::held::Held;
 use crate::names::{Item, Meaning};
 use crate::output;
 use crate::update::state_text;
@@ -32,6 +33,9 @@ const OBJECTS: [&str; 7] = [
 const GROUPS: [&str; 7] = [
     "identity", "line", "modules", "state", "faults", "counters", "others",
 ];
+
+/// Name of the outputs that links hold, among the registers.
+const HELD: &str = "outputs held by links";
 
 const fn group(address: u16) -> &'static str {
     match address {
@@ -71,6 +75,7 @@ pub async fn run(device: &mut Device, json: bool) -> Result<(), Failure> {
         .filter(|item| is_state(item) && !told(item));
     let state: Vec<Item> = state.cloned().collect();
     let values = device.read_items(&state).await?;
+    let held = device.held(&book, book.points()).await?;
     if json {
         let mut out: Map<String, Json> = identity
             .into_iter()
@@ -78,6 +83,9 @@ pub async fn run(device: &mut Device, json: bool) -> Result<(), Failure> {
             .collect();
         for (item, words) in state.iter().zip(&values) {
             out.insert(item.name.clone(), shown(item, words).json);
+        }
+        if !held.is_empty() {
+            out.insert(HELD.to_owned(), json!(held));
         }
         return output::json(&out);
     }
@@ -87,7 +95,17 @@ pub async fn run(device: &mut Device, json: bool) -> Result<(), Failure> {
         let shown = shown(item, words).to_string();
         (group(item.address), [item.name.clone(), shown])
     });
-    output::table(&grouped(&identity.chain(state).collect::<Vec<_>>()))
+    let held = held_row(&held).map(|row| ("state", row));
+    let rows = identity.chain(state).chain(held);
+    output::table(&grouped(&rows.collect::<Vec<_>>()))
+}
+
+/// Returns the row of the outputs that links hold, if there are any.
+fn held_row(held: &Held) -> Option<[String; 2]> {
+    let each = held.iter();
+    let each = each.map(|(output, sources)| format!("{output} by {}", sources.join(" and ")));
+    let all = each.collect::<Vec<_>>().join(", ");
+    (!all.is_empty()).then(|| [HELD.to_owned(), all])
 }
 
 /// Returns a value as shown. Register UPDATE has parts that only this program names.

@@ -1,6 +1,7 @@
 //! `modioctl links` and `modioctl link`.
 
 use register_map::codes::LinkAction;
+use register_map::configuration::COMM_TIMEOUT;
 use register_map::links::NO_SOURCE;
 use serde_json::{Value as Json, json};
 
@@ -28,7 +29,22 @@ pub async fn list(device: &mut Device, json: bool) -> Result<(), Failure> {
     }
     let rows = used.iter();
     let rows = rows.map(|(item, words)| [item.name.clone(), sentence(&book, item, words)]);
-    output::table(&rows.collect::<Vec<_>>())
+    output::table(&rows.collect::<Vec<_>>())?;
+    warn_of_alone(device, used.iter().map(|(_, words)| *words)).await
+}
+
+/// Prints a warning when one of these links acts only while the master is gone, and the unit does not notice that.
+async fn warn_of_alone<'a>(
+    device: &mut Device,
+    mut links: impl Iterator<Item = &'a Vec<u16>>,
+) -> Result<(), Failure> {
+    let is_for_alone = |words: &Vec<u16>| acts(words) && words.get(1).is_some_and(|w| is_alone(*w));
+    if links.any(is_for_alone) && device.read_words(COMM_TIMEOUT, 1).await? == [0] {
+        eprintln!(
+            "modioctl: warning: COMM_TIMEOUT is 0, so a link with `if alone` never acts: set the time after which the master counts as gone, such as `modioctl config set COMM_TIMEOUT=5`"
+        );
+    }
+    Ok(())
 }
 
 fn as_json(book: &Book, item: &Item, words: &[u16]) -> Json {
@@ -49,6 +65,7 @@ fn as_json(book: &Book, item: &Item, words: &[u16]) -> Json {
 /// Writes the link in `text`, or deletes the links of an output.
 pub async fn link(device: &mut Device, text: &str) -> Result<(), Failure> {
     let book = fetch_set(device).await?;
+    let mut note = None;
     let changes = match text.split_whitespace().collect::<Vec<_>>()[..] {
         ["none", output] => {
             let (_, items) = links::of_output(&book, output)?;
@@ -57,6 +74,7 @@ pub async fn link(device: &mut Device, text: &str) -> Result<(), Failure> {
         }
         _ => {
             let order = links::parse(&book, text)?;
+            note = links::note(&book, &order);
             let values = device.read_items(&order.links).await?;
             vec![(place(&book, &order, &values)?, order.words.to_vec())]
         }
@@ -69,7 +87,11 @@ pub async fn link(device: &mut Device, text: &str) -> Result<(), Failure> {
             sentence(&book, item, words)
         ))?;
     }
-    output::line(UNSAVED)
+    output::line(UNSAVED)?;
+    if let Some(note) = note {
+        eprintln!("modioctl: note: {note}");
+    }
+    warn_of_alone(device, changes.iter().map(|(_, words)| words)).await
 }
 
 /// Returns the link to write: the one that has this source already, or else the first free one.

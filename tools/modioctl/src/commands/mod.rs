@@ -109,7 +109,7 @@ async fn dispatch(mut cli: Cli, note: &Note) -> Result<(), Failure> {
     match cli.command {
         Command::Info => info::run(&mut device, json).await,
         Command::Read(options) => read::run(&mut device, &options, json).await,
-        Command::Write(options) => write::run(&mut device, &options).await,
+        Command::Write(options) => write::run(&mut device, &options, json).await,
         Command::Module(options) => module::run(device, options).await,
         Command::Config(options) => config::run(device, options, json, note).await,
         Command::Links => links::list(&mut device, json).await,

@@ -35,7 +35,8 @@ pub async fn print(
     output::table(&rows)
 }
 
-fn as_json(item: &Item, words: &[u16], raw: bool) -> Json {
+/// Returns an item with its value.
+pub fn as_json(item: &Item, words: &[u16], raw: bool) -> Json {
     let shown = show(item, words, raw);
     json!({
         "name": item.name,

@@ -1,11 +1,14 @@
 //! `modioctl write`.
 
 use modio_description::Table;
+use serde_json::json;
 
+use super::read::as_json;
 use crate::cli::Write;
 use crate::device::{Device, fetch};
 use crate::failure::Failure;
-use crate::names::Item;
+use crate::held;
+use crate::names::{Item, Meaning};
 use crate::output;
 use crate::value::{parse, show};
 
@@ -13,8 +16,8 @@ use crate::value::{parse, show};
 pub const UNSAVED: &str = "not saved: save with `modioctl config save`";
 
 /// Writes items by name or address, after all of them have been checked. When a name or a value is wrong, nothing is
-/// written.
-pub async fn run(device: &mut Device, options: &Write) -> Result<(), Failure> {
+/// written. Reports outputs that links hold, where the unit has accepted the write.
+pub async fn run(device: &mut Device, options: &Write, json: bool) -> Result<(), Failure> {
     let book = fetch(device).await?.book;
     let mut checked = Vec::new();
     for (name, text) in &options.values {
@@ -23,9 +26,27 @@ pub async fn run(device: &mut Device, options: &Write) -> Result<(), Failure> {
         checked.push((item, words));
     }
     device.write_items(&checked).await?;
-    let mut unsaved = false;
+    let bits = checked.iter().map(|(item, _)| item);
+    let bits = bits.filter(|item| item.meaning == Meaning::Bit);
+    let held = device.held(&book, bits).await?;
+    let is_unsaved = checked.iter().any(|(item, _)| item.setting);
+    if json {
+        let each = checked.iter().map(|(item, words)| {
+            let mut value = as_json(item, words, options.raw);
+            value["held_by"] = json!(held.get(&item.name).map_or(&[][..], Vec::as_slice));
+            value
+        });
+        output::json(&each.collect::<Vec<_>>())?;
+        if is_unsaved {
+            eprintln!("modioctl: {UNSAVED}");
+        }
+        return Ok(());
+    }
     for (item, words) in &checked {
-        unsaved |= item.setting;
+        if let Some(sources) = held.get(&item.name) {
+            output::line(format_args!("{}: {}", item.name, held::text(sources)))?;
+            continue;
+        }
         let when = if item.restart {
             " after save and restart"
         } else {
@@ -34,7 +55,7 @@ pub async fn run(device: &mut Device, options: &Write) -> Result<(), Failure> {
         let value = show(item, words, options.raw);
         output::line(format_args!("{} = {value}{when}", item.name))?;
     }
-    if unsaved {
+    if is_unsaved {
         output::line(UNSAVED)?;
     }
     Ok(())

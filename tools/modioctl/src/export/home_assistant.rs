@@ -201,15 +201,18 @@ fn entities(hub: &mut Hub, source: &Source, unit: Unit<'_>) -> Vec<Number> {
         scan_interval: Some(SLOWLY),
         ..sensor(item, unit)
     }));
-    let bits = |writable| {
-        points().filter(move |item| item.table == Table::Bit && item.writable == writable)
-    };
-    hub.binary_sensors
-        .extend(bits(false).map(|item| BinarySensor {
-            entity: entity(item, unit),
-            input_type: "discrete_input",
-        }));
-    hub.switches.extend(bits(true).map(|item| Switch {
+    let bits = || points().filter(|item| item.table == Table::Bit);
+    let sensors = bits().filter(|item| !source.can_set(item));
+    hub.binary_sensors.extend(sensors.map(|item| BinarySensor {
+        entity: entity(item, unit),
+        input_type: if item.writable {
+            "coil"
+        } else {
+            "discrete_input"
+        },
+    }));
+    let switches = bits().filter(|item| source.can_set(item));
+    hub.switches.extend(switches.map(|item| Switch {
         entity: entity(item, unit),
         write_type: "coil",
         command_on: 1,

@@ -14,6 +14,7 @@ use modio_description::{Table, Unit};
 use crate::bus::adu::Framing;
 use crate::bus::{Endpoint, Place};
 use crate::failure::Failure;
+use crate::held::Held;
 use crate::names::{Book, Item, Meaning};
 
 /// Name of a line with several units, if the user gives none.
@@ -54,6 +55,8 @@ pub struct Source {
     pub book: Book,
     /// Source of the unit's description.
     pub source: String,
+    /// The outputs that links hold. They are sensors, because a write to them has no effect.
+    pub held: Held,
 }
 
 /// Returns the text of a configuration.
@@ -100,6 +103,11 @@ impl Line<'_> {
 }
 
 impl Source {
+    /// Returns whether a master can set a point.
+    fn can_set(&self, point: &Item) -> bool {
+        point.writable && !self.held.contains_key(&point.name)
+    }
+
     fn counters(&self) -> impl Iterator<Item = &Item> {
         let is_input = |name: &str| {
             let mut points = self.book.points();

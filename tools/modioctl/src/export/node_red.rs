@@ -75,7 +75,8 @@ fn tab(source: &Source, name: &str, client: &str) -> Vec<Json> {
             nodes.extend(read(&run, &unit, row, seconds));
         }
     }
-    for item in source.book.points().filter(|item| item.writable) {
+    let outputs = source.book.points().filter(|item| source.can_set(item));
+    for item in outputs {
         row += 1;
         nodes.extend(write(item, &unit, row));
     }

@@ -15,6 +15,8 @@ use super::messages::{Polled, Update, Write};
 use super::plan::{is_analog, is_digital_input};
 use super::tree::{Row, Tree};
 use crate::failure::Failure;
+use crate::held;
+use crate::links;
 use crate::names::{Book, Item};
 use crate::value::show;
 
@@ -243,7 +245,11 @@ impl Model {
                 if let Some(pending) = self.pending.get_mut(&name) {
                     pending.confirmed = Some(now);
                 }
-                self.say(&format!("{name} = {value}: the unit has confirmed it"), now);
+                let text = match self.held(&write.item, now) {
+                    Some(held) => format!("{name}: {held}"),
+                    None => format!("{name} = {value}: the unit has confirmed it"),
+                };
+                self.say(&text, now);
             }
             Err(failure) => {
                 self.pending.remove(&name);
@@ -291,6 +297,18 @@ impl Model {
     pub fn counter(&self, name: &str, now: Instant) -> Option<(&Stamped, bool)> {
         let value = self.values.get(name)?;
         Some((value, self.link.is_fresh(value.at, now, SELDOM)))
+    }
+
+    /// Says which links hold an output, as far as that is known; `None` if none does.
+    pub fn held(&self, output: &Item, now: Instant) -> Option<String> {
+        let links = links::of(&self.book, &output.name);
+        let sources = links.filter_map(|link| {
+            let (value, is_fresh) = self.counter(&link.name, now)?;
+            held::source(&value.words).filter(|_| is_fresh)
+        });
+        let mut sources: Vec<_> = sources.collect();
+        sources.dedup();
+        (!sources.is_empty()).then(|| held::text(&sources))
     }
 
     /// Returns the history of a point.

@@ -48,8 +48,14 @@ class Links(OnPage):
         self.eventually(lambda: self.unit(1), [2, 0x103, 0, 0])
         self.page.get_by_label("Condition of link 1 of p2.2").select_option(label="always")
         self.eventually(lambda: self.unit(1), [2, 3, 0, 0])
+        self.page.get_by_label("Action of link 1 of p2.2").select_option(label="change")
+        self.eventually(lambda: self.unit(1), [2, 7, 0, 0])
+        # A link acts a second after it was written.
+        self.simulator.wait(1100)
         self.switch("Digital input p1.3").click()
         self.is_on("Digital output p2.2", "conducts")
+        self.switch("Digital input p1.3").click()
+        self.is_on("Digital output p2.2", "off", False)
         self.page.get_by_role("button", name="Remove link 1 of p2.2").click()
         self.eventually(lambda: self.unit(1), NONE)
 

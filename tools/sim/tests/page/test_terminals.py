@@ -48,5 +48,7 @@ class Terminals(OnPage):
         # As the page does: the master of the tests also receives the requests of the page.
         read = struct.pack(">BHH", 3, 0x0400 + 4 * (Y0 + 1), 2)
         self.eventually(lambda: struct.unpack(">HH", self.simulator.request(read)[2:]), (3, 3))
+        # A link acts a second after it was written.
+        self.simulator.wait(1100)
         self.switch("X3").click()
         self.is_on("Relay Y1", "energised")

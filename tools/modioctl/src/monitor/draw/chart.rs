@@ -73,8 +73,13 @@ fn facts(frame: &mut Frame, model: &Model, item: &Item, area: Rect, now: Instant
         lines.extend(edges);
     }
     if item.writable {
+        let held = model.held(item, now);
+        let text = held.map_or_else(
+            || "Space switches it.".to_owned(),
+            |held| format!("{} is {held}.", item.name),
+        );
         lines.push(Line::default());
-        lines.push(Line::from("Space switches it."));
+        lines.push(Line::from(text));
     }
     if item.meaning == Meaning::Unknown {
         lines.push(Line::from("RANGE and SCALE are not known."));

@@ -204,6 +204,41 @@ fn links_are_shown_at_their_output_and_their_input() {
 }
 
 #[test]
+fn output_that_a_link_holds_is_marked_and_a_write_to_it_says_so() {
+    let now = Instant::now();
+    let mut model = model(Module::Do4, now);
+    let relays = Box::new(book(&MODIO_08, Module::Relay2, (0, 0)));
+    model.update(Update::Learned(relays), now);
+    let mut round = polled(now, &[]);
+    for (name, words) in [
+        ("p1.3", vec![1]),
+        ("p1.3.channel_status", vec![0]),
+        // The jumper p1.1 holds the coil p1.3.
+        ("p1.3.link1", vec![0, 1, 0, 0]),
+        ("p1.4", vec![1]),
+        ("p1.4.link1", vec![0, 3, 0, 0]),
+    ] {
+        round.words.insert(name.to_owned(), words);
+    }
+    model.update(Update::Polled(round), now);
+    model.tree.select(3);
+    let rows = screen(&mut model, 120, 40, now);
+    let row = |name: &str| {
+        let row = rows.iter().find(|row| row.starts_with(name)).unwrap();
+        row.chars().take(60).collect::<String>()
+    };
+    let (held, free) = (row("  p1.3"), row("  p1.4"));
+    assert!(held.contains("■ on  held by a link"), "{held}");
+    assert!(free.contains("[■ on]"), "{free}");
+    let says = "held by link p1.1; a write to a held output has no effect";
+    // Of this text the column shows the beginning in one row.
+    assert!(rows.join("\n").contains("p1.3 is held by link p1.1;"));
+    let write = model.operate(now).unwrap();
+    model.update(Update::Wrote(write, Ok(())), now);
+    assert_eq!(model.notice(now), Some(&*format!("p1.3: {says}")));
+}
+
+#[test]
 fn last_edges_of_the_selected_input_are_shown_newest_first() {
     let now = Instant::now();
     let mut model = model(Module::Di4, now);

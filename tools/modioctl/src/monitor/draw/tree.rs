@@ -82,7 +82,13 @@ fn point(model: &Model, item: &Item, now: Instant) -> Line<'static> {
             (format!("old: {}", ago(age)), OLD)
         }
         None => ("not known".to_owned(), OLD),
-        Some((_, true)) => judged(model, &status, now),
+        Some((_, true)) => {
+            let (text, style) = judged(model, &status, now);
+            match model.held(item, now) {
+                Some(_) if style != BAD => ("held by a link".to_owned(), style),
+                _ => (text, style),
+            }
+        }
     };
     let style = if fresh { Style::new() } else { OLD };
     let left = format!("  {:<4} {:<15}", item.name, item.about);
@@ -96,7 +102,7 @@ fn point(model: &Model, item: &Item, now: Instant) -> Line<'static> {
     ])
 }
 
-/// Returns the value of a point for people, and whether it is fresh. Outputs are in brackets. An arrow marks a
+/// Returns the value of a point for people, and whether it is fresh. Outputs that can be set are in brackets. An arrow marks a
 /// value that is being written.
 fn value(model: &Model, item: &Item, now: Instant) -> (String, bool) {
     let read = model.value(&item.name, now);
@@ -106,7 +112,7 @@ fn value(model: &Model, item: &Item, now: Instant) -> (String, bool) {
         (None, None) => "?".to_owned(),
         (None, Some((value, _))) => with_mark(&show(item, &value.words, false)),
     };
-    if item.writable {
+    if item.writable && model.held(item, now).is_none() {
         (format!("[{shown}]"), fresh)
     } else {
         (format!("{shown} "), fresh)
