@@ -19,6 +19,8 @@ PATIENCE = 60.0
 SILENCE_MS = 500
 # Seconds after which a master without a reply gives up, in tests that expect no reply.
 GIVE_UP = 0.5
+# The beginning of a warning of the simulator that says nothing about the unit.
+TOO_SLOW = "modio-sim: warning: this computer has run the boards at"
 
 
 class Simulator(modio_sim.Simulator):
@@ -34,10 +36,12 @@ class Simulator(modio_sim.Simulator):
         return cls.start(board=board, elf=os.environ[image], options=options, **more)
 
     def end_well(self):
-        """Ends the simulator as Ctrl-C does. It must end without an error and without any output on stderr."""
+        """Ends the simulator as Ctrl-C does. It must end without an error, and without any output on stderr but the warning
+        that this computer is too slow, which is no fault of the simulator."""
         status = self.close()
-        if status != 0 or self.complaints:
-            raise AssertionError(f"exit status {status}, stderr {self.complaints}")
+        complaints = [line for line in self.complaints if not line.startswith(TOO_SLOW)]
+        if status != 0 or complaints:
+            raise AssertionError(f"exit status {status}, stderr {complaints}")
 
     @property
     def gateway(self) -> str:
