@@ -1,5 +1,5 @@
 //! Pulses after a request, at the rates at which a character takes less time than other work of the unit, on the boards
-//! that the matrix does not have. The interrupt of a start bit and the scan of many modules must not add to their delay.
+//! that the matrix does not have. The interrupt of a start bit must not add to their delay.
 
 use conformance::endpoint::sim::Fitting;
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
