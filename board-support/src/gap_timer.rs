@@ -133,6 +133,14 @@ impl Rs485Timer {
             .write(|w| w.urs().counter_only().opm().enabled());
     }
 
+    /// Enables the interrupt of an edge, or disables it.
+    #[inline(always)]
+    fn set_edge_interrupt(on: bool) {
+        if let Some(edge) = EDGE {
+            edge.set_interrupt(on);
+        }
+    }
+
     /// Selects whether t1.5 is reported one character time late. Returns the previous selection.
     fn late_t15(&mut self, on: bool) -> bool {
         let before = self.timer.dier().read().cc2ie().bit_is_set();
@@ -255,6 +263,7 @@ impl GapTimer for Rs485Timer {
         timer.ccr2().write(|w| w.ccr().set((time >> 16) as u16));
         timer.sr().write(|w| w.cc2if().clear_bit());
         timer.dier().modify(|_, w| w.cc2ie().enabled());
+        Self::set_edge_interrupt(true);
         // The count may have reached it in front of the flag's clearing.
         time.wrapping_sub(self.now()).cast_signed() > 0
     }
@@ -271,6 +280,7 @@ impl GapTimer for Rs485Timer {
     fn restart(&mut self) {
         // Only edges after this character count.
         self.forget_edge();
+        Self::set_edge_interrupt(true);
         // The update event clears the counter and the prescaler. With URS set it raises no interrupt.
         self.timer
             .cr1()
@@ -285,6 +295,7 @@ impl GapTimer for Rs485Timer {
     fn stop(&mut self) {
         self.halt();
         self.timer.sr().reset();
+        Self::set_edge_interrupt(false);
     }
 
     #[inline]
@@ -293,6 +304,10 @@ impl GapTimer for Rs485Timer {
         // Clear only the flags that were read; a flag set after that raises the interrupt again.
         // SAFETY: writing 0 clears a bit of SR and writing 1 leaves it unchanged (RM0008 15.4.5).
         self.timer.sr().write(|w| unsafe { w.bits(!flags.bits()) });
+        // The frame is over, or nearly so. Outside an arbitration the times of further edges do not matter.
+        if EDGE.is_some() && self.start_bit.dier().read().bits() & WAKE == 0 {
+            Self::set_edge_interrupt(false);
+        }
         let may_be_on_its_way = self.has_fallen();
         if flags.uif().bit_is_set() {
             // The counter has stopped, because of one-pulse mode.

@@ -123,6 +123,18 @@ const fn priority(interrupt: u16) -> Block {
     (NVIC + register as u32, ALL, &[0])
 }
 
+/// Returns the compared bits of a register with 32 interrupt enables. That of the line's edges changes in operation.
+const fn enables(register: u16) -> i16 {
+    match EDGE {
+        Some(pin) if pin.edge_interrupt() / 32 == register => {
+            let bit = pin.edge_interrupt() % 32;
+            assert!(bit < 15, "the mask has no bit for this interrupt alone");
+            !(1 << bit)
+        }
+        _ => ALL,
+    }
+}
+
 /// The registers in groups: clocks and resets, pulls, others that are written, scan timer, second line, line.
 const GROUPS: [&[Block]; 6] = [
     // CFGR, APB2RSTR, APB1RSTR, AHBENR, APB2ENR, APB1ENR (RM0008 7.3).
@@ -145,7 +157,8 @@ const GROUPS: [&[Block]; 6] = [
         modes(Port::D, CRH),
         modes(Port::E, CRL),
         modes(Port::E, CRH),
-        (NVIC, ALL, &[ISER, ISER + 4]),
+        (NVIC, enables(0), &[ISER]),
+        (NVIC, enables(1), &[ISER + 4]),
         (NVIC, ALL, &PRIORITIES),
         priority(BOARD.line.uart.interrupt()),
         priority(match EDGE {

@@ -106,16 +106,44 @@ fn train(width: Duration, first: Duration, spacing: Duration, last: Duration) ->
     pulses
 }
 
-/// Time that the unit's processor may be busy with other work when its reply is due. The reply then begins up to one
-/// bit later, at the next clock of the UART.
+/// Time that an interrupt of the unit may wait for another one when its reply is due. The reply then begins up to one bit
+/// later, at the next clock of the UART.
 const BUSY: Duration = Duration::from_micros(5);
+
+/// Number of times that a request with the same pulses is sent until its reply is early enough.
+const TRIES: u32 = 4;
+/// How much later in a millisecond each further try begins.
+const SHIFT: Duration = Duration::from_micros(237);
+const MILLISECOND: Duration = Duration::from_millis(1);
+
+/// Sends a request and pulses after it, as [`turnaround`] does, until the reply takes at most this time.
+///
+/// Other work of the unit, such as the scan of its modules, holds up replies that are due at the same instant, whether
+/// there are pulses or not. Usually it recurs every millisecond. Pulses that delay a reply delay it at any instant.
+fn least_turnaround(
+    bench: &mut Bench<'_>,
+    pulses: &[Piece],
+    most: Duration,
+) -> Check<(Reply, Duration)> {
+    let begun = bench.endpoint.now();
+    let mut last = turnaround(bench, pulses)?;
+    for n in 1..TRIES {
+        if last.1 <= most {
+            break;
+        }
+        let passed = bench.endpoint.now().saturating_sub(begun).as_nanos() % MILLISECOND.as_nanos();
+        bench.rest(MILLISECOND + SHIFT * n - Duration::from_nanos(passed as u64))?;
+        last = turnaround(bench, pulses)?;
+    }
+    Ok(last)
+}
 
 fn noise_behind(bench: &mut Bench<'_>) -> Check {
     let line = bench.endpoint.line();
     let bit = line.bits(1);
-    let mut undisturbed = Duration::ZERO;
+    let mut undisturbed = Duration::MAX;
     for _ in 0..5 {
-        undisturbed = undisturbed.max(turnaround(bench, &[])?.1);
+        undisturbed = undisturbed.min(turnaround(bench, &[])?.1);
     }
     let most = undisturbed + line.characters(1) + bit + BUSY;
     let silence = line.t35_limits().least;
@@ -134,7 +162,7 @@ fn noise_behind(bench: &mut Bench<'_>) -> Check {
                 // Pulses that end before the reply may start, and pulses that continue while it is due.
                 for last in [silence - bit * 3, most + line.characters(2)] {
                     let pulses = train(width, first, spacing, last);
-                    let (reply, took) = turnaround(bench, &pulses)?;
+                    let (reply, took) = least_turnaround(bench, &pulses, most)?;
                     bench.ensure(
                         took <= most,
                         format!(

@@ -4,6 +4,7 @@
 #![cfg(feature = "sim")]
 
 mod matrix;
+mod noise;
 
 use std::env;
 use std::io::{BufRead, BufReader};
