@@ -84,7 +84,8 @@ fn measure(workspace: &mut Workspace, board: &'static Board) -> Result<Value> {
     report["image"] = size::report(&elf)?;
     report["loader"] = size::report(&loader)?;
     let application = fs::metadata(&image)?.len() - u64::from(HEADER);
-    report["slot"] = json!({ "flash": application, "budget": board.memory().budget[0] });
+    let [slot, _] = size::limit(board, Some(Slot::A));
+    report["slot"] = json!({ "flash": application, "budget": slot });
     server::add(&mut report, &image::parse(&image::read(&elf)?)?)?;
     Ok(report)
 }

@@ -83,7 +83,7 @@ enum Command {
     Test(test::Options),
     /// Run the steps of CI: formatting, lints, documentation, those of `test` and longer ones
     Ci(test::Chosen),
-    /// Show flash and RAM by crate and section, and what is left of the parts and the budget
+    /// Show flash and RAM by crate and section, and what is left of the slot, or of the smallest part
     Size(size::Options),
     /// Count the instructions of every request, the processor's load, flash and RAM
     Bench(bench::Options),

@@ -1,12 +1,11 @@
-//! `cargo xtask size`: the flash and RAM of the image, by section and by crate, and what is left of the parts and of
-//! the budget.
+//! `cargo xtask size`: the flash and RAM of the image, by section and by crate, and what is left.
 
 use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
-use register_map::board::{Board, Memory};
-use register_map::layout::LOADER;
-use register_map::part::KIB;
+use register_map::Board;
+use register_map::layout::{HEADER, LOADER};
+use register_map::part::FLASH_BASE;
 use register_map::update::Slot;
 use serde_json::{Value, json};
 
@@ -32,7 +31,7 @@ pub struct Options {
     slot: Option<Slot>,
 }
 
-/// `cargo xtask size`. An image that exceeds a limit is an error.
+/// `cargo xtask size`. An image that exceeds its limit is an error.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     let board = options.given.board();
     let elf = match options.slot {
@@ -40,22 +39,31 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
         None => options.given.elf(workspace)?,
     };
     let sizes = of(&elf)?;
-    say!("{}", as_table(&sizes, board.memory()));
-    within_limits(sizes.total(), board.memory())
+    let limit = limit(board, options.slot);
+    say!("{}", as_table(&sizes, limit));
+    within(sizes.total(), limit)
 }
 
-/// Fails when the loader or an image does not fit the parts and the budget of a board.
+/// Shows what is left of the loader and of each image of a board. Fails when one exceeds its limit.
 pub fn check(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
     let loader = build::loader(workspace, board)?;
     let [flash, _] = of(&loader)?.total();
+    say!("loader: {} bytes of flash left", left(LOADER, flash));
     ensure!(
         flash <= LOADER,
         "the loader takes {flash} bytes of flash, more than its {LOADER}"
     );
-    let slots = Slot::ALL.map(Program::Slot);
-    for program in slots.into_iter().chain([Program::Alone]) {
+    for (name, slot) in [
+        ("slot a", Some(Slot::A)),
+        ("slot b", Some(Slot::B)),
+        ("alone", None),
+    ] {
+        let program = slot.map_or(Program::Alone, Program::Slot);
         let elf = build::program(workspace, board, program, None)?.elf;
-        within_limits(of(&elf)?.total(), board.memory())?;
+        let (taken, limit) = (of(&elf)?.total(), limit(board, slot));
+        let [flash, ram] = [0, 1].map(|memory| left(limit[memory], taken[memory]));
+        say!("{name}: {flash} bytes of flash and {ram} of RAM left");
+        within(taken, limit)?;
     }
     Ok(())
 }
@@ -76,22 +84,24 @@ fn of(elf: &Path) -> Result<Sizes> {
     measure(&image::read(elf)?).with_context(|| elf.display().to_string())
 }
 
-/// Returns the limits of an image, each with its name: the parts, the smaller one first, and the budget.
-fn limits(memory: &Memory) -> impl Iterator<Item = (&'static str, Bytes)> {
-    let parts = memory.smaller.into_iter().chain([memory.part]);
-    let parts = parts.map(|part| (part.name, [part.flash, part.ram]));
-    parts.chain([("budget", memory.budget)])
+/// Returns the bytes of flash and of RAM that an image may take: flash of its slot, or of the smallest part without the
+/// store when it runs alone, and the RAM that the stack leaves.
+pub fn limit(board: &Board, slot: Option<Slot>) -> Bytes {
+    let flash = match slot {
+        Some(_) => board.layout().slot - HEADER,
+        None => board.store.first - FLASH_BASE,
+    };
+    let memory = board.memory();
+    [flash, memory.least().ram - memory.stack]
 }
 
-fn within_limits([flash, ram]: Bytes, memory: &Memory) -> Result<()> {
-    for (name, limit) in limits(memory) {
-        ensure!(
-            flash <= limit[0] && ram <= limit[1],
-            "the image takes {flash} bytes of flash and {ram} of RAM, more than {name} has ({} and {})",
-            limit[0],
-            limit[1]
-        );
-    }
+fn within([flash, ram]: Bytes, limit: Bytes) -> Result<()> {
+    ensure!(
+        flash <= limit[0] && ram <= limit[1],
+        "the image takes {flash} bytes of flash and {ram} of RAM, more than {} and {}",
+        limit[0],
+        limit[1]
+    );
     Ok(())
 }
 
@@ -100,57 +110,49 @@ fn left(limit: u32, taken: u32) -> i64 {
     i64::from(limit) - i64::from(taken)
 }
 
-fn as_table(sizes: &Sizes, memory: &Memory) -> String {
+fn as_table(sizes: &Sizes, limit: Bytes) -> String {
     let row = |(name, taken): &(String, Bytes)| {
         let [flash, ram] = taken.map(|bytes| bytes.to_string());
         [name.clone(), flash, ram]
     };
-    let heading =
-        |name: &str| [["", "", ""], [name, "flash", "RAM"]].map(|row| row.map(str::to_owned));
     let total = sizes.total();
     let mut rows: Vec<[String; 3]> = sizes.sections.iter().map(row).collect();
-    rows.extend(heading("crate"));
+    rows.extend([["", "", ""], ["crate", "flash", "RAM"]].map(|row| row.map(str::to_owned)));
     rows.extend(sizes.crates.iter().map(row));
     rows.push(row(&("total".to_owned(), total)));
-    rows.extend(heading("left of (stack not counted)"));
-    rows.extend(limits(memory).map(|(name, [flash, ram])| {
-        let name = format!("{name} ({} KiB / {} KiB)", flash / KIB, ram / KIB);
-        let (flash, ram) = (left(flash, total[0]), left(ram, total[1]));
-        [name, flash.to_string(), ram.to_string()]
-    }));
+    rows.push(row(&("limit (stack not counted)".to_owned(), limit)));
+    let [flash, ram] = [0, 1].map(|memory| left(limit[memory], total[memory]).to_string());
+    rows.push(["left".to_owned(), flash, ram]);
     table::figures(&["section", "flash", "RAM"], rows)
 }
 
 #[cfg(test)]
 mod tests {
-    use register_map::board::MODIO_02;
+    use register_map::board::{MODIO_02, MODIO_08};
+    use register_map::part::KIB;
 
     use super::*;
 
     #[test]
-    fn image_that_exceeds_a_limit_is_an_error_that_names_it() {
-        let memory = MODIO_02.memory();
-        let [flash, ram] = memory.budget;
-        for (taken, limit) in [
-            ([flash, ram], None),
-            ([flash + 1, 0], Some("budget")),
-            ([0, ram + 1], Some("budget")),
-            ([64 * KIB + 1, 0], Some("STM32F103C8")),
-            ([0, 20 * KIB + 1], Some("STM32F103C8")),
-        ] {
-            let error = within_limits(taken, memory).err();
-            let text = error.map(|error| error.to_string());
-            assert_eq!(text.is_some(), limit.is_some(), "{text:?}");
-            assert!(text.unwrap_or_default().contains(limit.unwrap_or_default()));
+    fn limit_is_the_slot_or_the_smallest_part_and_an_image_above_it_is_an_error() {
+        let slot = limit(&MODIO_02, Some(Slot::B));
+        assert_eq!(slot, [54_784, 11 * KIB]);
+        assert_eq!(limit(&MODIO_02, None), [62 * KIB, 11 * KIB]);
+        assert_eq!(limit(&MODIO_08, Some(Slot::A)), [118_272, 37 * KIB]);
+        assert!(within(slot, slot).is_ok());
+        for taken in [[slot[0] + 1, 0], [0, slot[1] + 1]] {
+            let error = within(taken, slot).unwrap_err();
+            assert!(error.to_string().contains("54784"), "{error}");
         }
     }
 
     #[test]
-    fn report_has_what_is_left_of_parts_and_budget() {
+    fn report_has_what_is_left() {
         let sections = vec![(".text".to_owned(), [70_000, 5_000])];
         let crates = Vec::new();
-        let table = as_table(&Sizes { sections, crates }, MODIO_02.memory());
-        assert!(table.contains("budget (52 KiB / 10 KiB)"), "{table}");
-        assert!(table.contains("-16752"), "{table}");
+        let table = as_table(&Sizes { sections, crates }, [54_784, 11_264]);
+        let last = table.lines().last().unwrap_or_default();
+        let words: Vec<_> = last.split_whitespace().collect();
+        assert_eq!(words, ["left", "-15216", "6264"], "{table}");
     }
 }

@@ -35,6 +35,8 @@ pub enum Need {
     SetLine,
     /// The configuration may be written (`--allow-config`).
     Config,
+    /// The configuration lock of the modio is closed, for which the run waits.
+    LockClosed,
     /// The unit is a modio.
     Modio,
     /// The unit speaks RTU.

@@ -1,13 +1,17 @@
 //! Reads, writes and restores the unit's points for a case, by the functions that the unit has.
 
 use std::fmt::Display;
+use std::time::Duration;
 
 pub use modbus_line::adu::{pdu, words_of, write_words};
-use register_map::configuration::{KEY, OPENING_KEY};
+use register_map::configuration::{KEY, OPEN_S, OPENING_KEY};
 
 use crate::bench::Bench;
 use crate::case::{Check, Stop};
 use crate::target::{Span, Words};
+
+/// Interval at which a unit is asked whether its configuration lock has closed.
+const LOCK_INTERVAL: Duration = Duration::from_secs(1);
 
 /// Returns a request of function 08.
 pub fn diagnose(sub: u16, data: &[u8]) -> Vec<u8> {
@@ -153,6 +157,22 @@ impl Bench<'_> {
     /// Opens a modio's configuration lock.
     pub fn unlock(&mut self) -> Check {
         self.reply(&pdu(6, KEY, OPENING_KEY)).map(drop)
+    }
+
+    /// Waits until a modio's configuration lock is closed. A case before may have opened it.
+    pub fn wait_for_lock(&mut self) -> Check {
+        let open = Duration::from_secs(OPEN_S.into());
+        // Where time is not exact, the unit may be a simulator that is slower than its clock.
+        let latest = self.endpoint.now() + self.exact(open, open * 4) + LOCK_INTERVAL;
+        while self.read_word(KEY)? != 0 {
+            let in_time = self.endpoint.now() < latest;
+            self.ensure(
+                in_time,
+                format!("the lock closes {open:?} after the last write"),
+            )?;
+            self.rest(LOCK_INTERVAL)?;
+        }
+        Ok(())
     }
 
     /// Reads the values of the points that cases write to.

@@ -106,6 +106,9 @@ fn one(
     let locked = case.needs.contains(&Need::Words) && target.words.is_some_and(|w| w.locked);
     let mut before = None;
     let result = (|| {
+        if case.needs.contains(&Need::LockClosed) {
+            bench.wait_for_lock()?;
+        }
         if locked {
             bench.unlock()?;
         }
@@ -181,6 +184,8 @@ fn lacking(need: Need, endpoint: &dyn Endpoint, target: &Target) -> Option<Strin
             target.allow_config,
             "writes the configuration: --allow-config",
         ),
+        // The run waits for it.
+        Need::LockClosed => return None,
         Need::Modio => (target.modio.is_some(), "about the modio only"),
         Need::Rtu => (target.mode == Mode::Rtu, "about RTU framing"),
         Need::Ascii => (target.mode == Mode::Ascii, "about ASCII framing: --ascii"),

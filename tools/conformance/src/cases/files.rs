@@ -1,10 +1,12 @@
 //! File records, functions 14 and 15, and the file that describes a modio.
 
 use modio_description::{Description, FILE, records};
+use register_map::edges::log;
+use register_map::update::{BLOCK_BYTES, status};
 use register_map::{points, state};
 
 use crate::bench::Bench;
-use crate::case::{Case, Check, Need, case};
+use crate::case::{Case, Check, Need, case, skip};
 use crate::target::Span;
 
 const N: &[Need] = &[Need::Function(0x14)];
@@ -27,7 +29,7 @@ pub(super) const CASES: &[Case] = &[
     case("files/groups", S, "several groups in one request are read in their order", M, groups),
     case("files/longest-reply", S, "a group of 124 records is read and one of 125 is exception 03", M,
         longest_of_modio),
-    case("files/beyond-the-end", "map", "records beyond the end of file 1, and files that do not exist, are exception 02", M,
+    case("files/beyond-the-end", "map", "records beyond the end of a file, and files that do not exist, are exception 02", M,
         beyond_the_end),
     case("files/read-only", "map", "a write to a file is exception 02 and writes nothing",
         &[Need::Function(0x14), Need::Function(0x15), Need::Modio], read_only),
@@ -169,13 +171,36 @@ fn longest_of_modio(bench: &mut Bench<'_>) -> Check {
     bench.exception(&request(&[(FILE, 0, 125)]), 3)
 }
 
+/// Returns the number of records of file 2, the state of an update; 0 without a loader, because then the unit has no such
+/// file.
+fn records_of_status(bench: &mut Bench<'_>) -> Check<u16> {
+    if bench.read_word(state::BUILD)? & state::build::NO_LOADER != 0 {
+        return Ok(0);
+    }
+    let Some(board) = bench.target.modio.and_then(|modio| modio.board) else {
+        return skip("the register map does not know the board, and so not the size of its slots");
+    };
+    let blocks = board.layout().slot as usize / BLOCK_BYTES;
+    Ok(status::BITMAP + blocks.div_ceil(16) as u16)
+}
+
 fn beyond_the_end(bench: &mut Bench<'_>) -> Check {
     let (_, records) = head(bench)?;
-    read(bench, &[(FILE, records - 1, 1)])?;
-    for beyond in [(records, 1), (records - 1, 2), (9999, 1)] {
-        bench.exception(&request(&[(FILE, beyond.0, beyond.1)]), 2)?;
+    let of_status = records_of_status(bench)?;
+    for (file, records) in [
+        (FILE, records),
+        (status::FILE, of_status),
+        (log::FILE, log::END),
+    ] {
+        if let Some(last) = records.checked_sub(1) {
+            read(bench, &[(file, last, 1)])?;
+            bench.exception(&request(&[(file, last, 2)]), 2)?;
+        }
+        for beyond in [records, 9999] {
+            bench.exception(&request(&[(file, beyond, 1)]), 2)?;
+        }
     }
-    for file in [2, 4, 0x100, 0xFFFF] {
+    for file in [4, 0x100, 0x180, 0xFFFF] {
         bench.exception(&request(&[(file, 0, 1)]), 2)?;
         bench.exception(&request(&[(FILE, 0, 1), (file, 0, 1)]), 2)?;
     }

@@ -26,12 +26,12 @@ mod worked;
 mod write_bits;
 mod write_words;
 
-use crate::case::Case;
+use crate::case::{Case, Need};
 
-/// Returns every case, in the order in which they run. Cases that reset counters are late, and cases that restart the
-/// unit are last.
+/// Returns every case, in the order in which they run. Cases that need a closed lock are first, because it takes a minute
+/// to close. Cases that reset counters are late, and cases that restart the unit are last.
 pub fn all() -> Vec<Case> {
-    [
+    let mut all = [
         read::FC01,
         read::FC02,
         read::FC03,
@@ -61,13 +61,15 @@ pub fn all() -> Vec<Case> {
         power::CASES,
         settings::CASES,
     ]
-    .concat()
+    .concat();
+    all.sort_by_key(|case| !case.needs.contains(&Need::LockClosed));
+    all
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::case::{Kind, Need};
+    use crate::case::Kind;
     use std::collections::BTreeSet;
 
     #[test]

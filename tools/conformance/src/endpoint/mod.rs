@@ -16,7 +16,7 @@ use crate::frame::hex;
 /// characters, breaks and glitches need [`Abilities::faults`].
 pub use modbus_line::exact::Piece;
 
-/// Returns pieces as text for people.
+/// Returns pieces as text for people. Pieces that repeat, alone or in pairs, are shown once with their number.
 pub(crate) fn shown(pieces: &[Piece]) -> String {
     let texts: Vec<String> = pieces
         .iter()
@@ -29,7 +29,39 @@ pub(crate) fn shown(pieces: &[Piece]) -> String {
             Piece::Glitch(width) => format!("(glitch of {} us)", width.as_micros()),
         })
         .collect();
-    texts.join(" ")
+    folded(&texts)
+}
+
+/// Number of repetitions from which on texts are shown once.
+const MANY: usize = 4;
+
+/// Joins texts. A text, or a pair of texts, that is repeated many times is there once with the number of times.
+fn folded(texts: &[String]) -> String {
+    let (mut parts, mut rest) = (Vec::new(), texts);
+    while let [first, ..] = rest {
+        let times = |length: usize| {
+            let mut all = rest.chunks(length);
+            all.position(|chunk| *chunk != rest[..length])
+                .unwrap_or(rest.len() / length)
+        };
+        let repeated = (1..=rest.len().min(2)).find(|length| times(*length) >= MANY);
+        let taken = match repeated {
+            Some(length) => {
+                parts.push(format!(
+                    "{} x [{}]",
+                    times(length),
+                    rest[..length].join(" ")
+                ));
+                times(length) * length
+            }
+            None => {
+                parts.push(first.clone());
+                1
+            }
+        };
+        rest = &rest[taken..];
+    }
+    parts.join(" ")
 }
 
 /// A received character, with the times of the endpoint's clock.
@@ -138,5 +170,30 @@ pub trait Endpoint {
     /// was lost because the driver was off. Only a simulator reports this.
     fn take_complaints(&mut self) -> Result<Vec<String>, Broken> {
         Ok(Vec::new())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pieces_that_repeat_are_shown_once_with_their_number() {
+        let gap = |us| Piece::Gap(Duration::from_micros(us));
+        let glitch = Piece::Glitch(Duration::from_micros(5));
+        let mut pieces = vec![Piece::Bytes(vec![1, 3]), gap(104), glitch.clone()];
+        for _ in 0..399 {
+            pieces.extend([gap(200), glitch.clone()]);
+        }
+        assert_eq!(
+            shown(&pieces),
+            "01 03 (104 us of silence) 399 x [(glitch of 5 us) (200 us of silence)] (glitch of 5 us)"
+        );
+        let breaks = [vec![Piece::Break(10); 400], vec![gap(1), gap(1)]].concat();
+        assert_eq!(
+            shown(&breaks),
+            "400 x [(break of 10 bits)] (1 us of silence) (1 us of silence)"
+        );
+        assert_eq!(shown(&[]), "");
     }
 }

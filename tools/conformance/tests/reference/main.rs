@@ -55,12 +55,12 @@ fn reference(fault: Option<Fault>, mode: Mode, format: &str) -> Reference {
     Reference::new(fault, mode, line)
 }
 
-/// Runs the case with the name `only`, or all cases. The unit has this fault.
+/// Runs these cases. The unit has this fault.
 fn outcomes(
     mut endpoint: Reference,
     fault: Option<Fault>,
     mode: Mode,
-    only: Option<&str>,
+    cases: &[Case],
 ) -> Vec<Outcome> {
     // Some faults would mislead the probe, so it gets the functions of a unit without a fault.
     let mut profile = Profile::parse(PROFILE).unwrap();
@@ -68,9 +68,7 @@ fn outcomes(
         profile.functions = Some(conformance::probe::FUNCTIONS.to_vec());
     }
     let target = probed(&mut endpoint, mode, Some(&profile));
-    let mut cases = all();
-    cases.retain(|case| only.is_none_or(|name| case.name == name));
-    run(&mut endpoint, &target, &cases).unwrap()
+    run(&mut endpoint, &target, cases).unwrap()
 }
 
 /// Asks the unit of this profile, or the modio.
@@ -93,7 +91,11 @@ fn given<'a>(endpoint: &Reference, mode: Mode, profile: Option<&'a Profile>) -> 
 }
 
 fn assert_passes(endpoint: Reference, mode: Mode) -> Vec<&'static str> {
-    let outcomes = outcomes(endpoint, None, mode, None);
+    assert_passes_in_order(endpoint, mode, &all())
+}
+
+fn assert_passes_in_order(endpoint: Reference, mode: Mode, cases: &[Case]) -> Vec<&'static str> {
+    let outcomes = outcomes(endpoint, None, mode, cases);
     let mut passed = Vec::new();
     for outcome in &outcomes {
         match &outcome.verdict {
@@ -121,6 +123,19 @@ fn server_without_a_fault_passes_every_case_that_is_not_about_a_modio() {
             case.name
         );
     }
+}
+
+/// A case that depends on what a case before it has left fails in another order.
+#[test]
+fn cases_pass_in_the_reverse_order_too() {
+    let reversed: Vec<Case> = all().into_iter().rev().collect();
+    for (mode, format) in [(Mode::Rtu, "8E1"), (Mode::Ascii, "7E1")] {
+        let passed = assert_passes(reference(None, mode, format), mode);
+        let mut back = assert_passes_in_order(reference(None, mode, format), mode, &reversed);
+        back.reverse();
+        assert_eq!(back, passed);
+    }
+    assert_modio_passes(reversed);
 }
 
 #[test]
@@ -174,7 +189,7 @@ fn every_fault_is_found_by_its_case() {
                 Mode::Rtu
             };
             let endpoint = reference(Some(*fault), mode, "8E1");
-            let outcomes = outcomes(endpoint, Some(*fault), mode, Some(name));
+            let outcomes = outcomes(endpoint, Some(*fault), mode, &[case]);
             if !matches!(outcomes[0].verdict, Verdict::Failed(_)) {
                 missed.push((fault, name, outcomes[0].verdict.clone()));
             }
@@ -191,7 +206,10 @@ fn outcomes_of_modio(fault: Option<ModioFault>, cases: &[Case]) -> Vec<Outcome> 
 
 #[test]
 fn modio_without_a_fault_passes_every_case_about_a_modio() {
-    let mut cases = all();
+    assert_modio_passes(all());
+}
+
+fn assert_modio_passes(mut cases: Vec<Case>) {
     cases.retain(|case| case.kind == Kind::Modio);
     for outcome in outcomes_of_modio(None, &cases) {
         let row = conformance::report::table::row(&outcome);

@@ -9,6 +9,7 @@ use modbus_reference::Device;
 use modio_description::{Description, checksum, describe};
 use register_map::board::MODIO_02;
 use register_map::codes::{Baud, Command, Format, Mode};
+use register_map::edges::log;
 use register_map::points::{self, Kind};
 use register_map::{BLOCKS, Module, configuration as at, counters, rule_at, runs, state};
 
@@ -173,7 +174,8 @@ impl Modio {
         }
     }
 
-    /// Serves file 1, the self-description, which is the only file.
+    /// Serves file 1, the self-description, and file 3, the log of edges, which is empty. Without a loader there is no
+    /// file 2.
     fn files(&self, pdu: &[u8]) -> Answer {
         let mut pdu = pdu.to_vec();
         if pdu[0] == 0x15 && self.has(ModioFault::EchoesFileWrites) {
@@ -200,7 +202,7 @@ impl Modio {
                 .for_each(|group| group[3..5].copy_from_slice(&first[3..5]));
         }
         let mut device = Device {
-            files: vec![words],
+            files: vec![words, Vec::new(), vec![0; log::END.into()]],
             read_only_from: 0,
             ..Device::new(0, 0)
         };
@@ -272,6 +274,7 @@ impl Modio {
                 flags.iter().map(|(bit, set)| bit * u16::from(*set)).sum()
             }
             SLOT_MODULE => MODULE.code(),
+            state::BUILD => state::build::NO_LOADER,
             state::DESCRIPTION_CRC if self.has(ModioFault::StaleDescriptionCrc) => 0x1234,
             state::DESCRIPTION_CRC => checksum(&description().encode()),
             state::BUS_MESSAGES..state::T15_GAPS => {
