@@ -175,7 +175,12 @@ impl<const SLOTS: usize> Device<SLOTS> {
         if let Some(port) = self.points.ports_mut().get_mut(slot) {
             port.end_pulses(now);
         }
-        if self.linking.outputs.get(slot).is_some_and(Outputs::exist) {
+        if self
+            .linking
+            .outputs
+            .get(slot)
+            .is_some_and(Outputs::are_to_run)
+        {
             self.run_slot(slot, now);
         }
     }

@@ -85,10 +85,10 @@ impl Outputs {
         }
     }
 
-    /// Returns whether there is a link.
+    /// Returns whether the links are to run: there is one, or one that has gone still holds an output.
     #[must_use]
-    pub const fn exist(&self) -> bool {
-        self.levels | self.edges != 0
+    pub const fn are_to_run(&self) -> bool {
+        self.levels | self.edges | self.held | self.kept != 0
     }
 
     /// Returns the level links.

@@ -338,3 +338,19 @@ fn heater_works_again_a_minute_after_its_sensor_was_mended() {
     assert_eq!(sensor.scan((0..60_000).map(|_| 3_156)), 0);
     assert!(sensor.scan((0..2_000).map(|_| 3_156)) > 900);
 }
+
+#[test]
+fn output_is_the_masters_again_after_the_last_link_of_its_slot_has_gone() {
+    let mut bench = linked(link(0, Follow, [0; 2]), NONE);
+    bench.input(0, true);
+    assert!(bench.device.driven(1).bit(0));
+    // ACTION 0, the way that safety.md names for work on the load.
+    bench
+        .write(links::of_point(OUTPUT, false) + 1, &[0])
+        .unwrap();
+    bench.pass(2_000);
+    bench.write_output(false);
+    bench.pass(1);
+    assert!(!bench.device.driven(1).bit(0), "the terminal");
+    assert_eq!(bench.device.held_outputs(), 0);
+}
