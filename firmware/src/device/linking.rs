@@ -45,7 +45,7 @@ impl<const SLOTS: usize> Linking<SLOTS> {
         self.outputs.get(slot).map_or(0, Outputs::to_keep)
     }
 
-    /// Returns the outputs of a slot that a link holds that always acts, channel 1 in bit 0.
+    /// Returns the outputs of a slot that a link holds or will hold that always acts, channel 1 in bit 0.
     pub fn held_always(&self, slot: usize) -> u8 {
         self.outputs.get(slot).map_or(0, Outputs::held_always)
     }

@@ -240,3 +240,20 @@ fn saved_settings_alone_decide_which_outputs_are_stored() {
     bench.write(at::COMMAND, &[1]).unwrap();
     assert!(bench.device.outputs().is_empty());
 }
+
+#[test]
+fn output_that_a_link_always_holds_uses_no_record_while_its_link_begins_again() {
+    let mut bench = keeping(&[]);
+    bench.unlock();
+    let link = [12, LinkAction::Follow.code(), 0, 0];
+    bench.write(links::of_point(3, false), &link).unwrap();
+    bench.pass(1_010);
+    let before = bench.device.outputs();
+    // A master that sets its link again.
+    bench.write(links::of_point(3, false), &link).unwrap();
+    bench.pass(10);
+    assert_eq!(bench.device.outputs(), before, "while it rests");
+    bench.write(at::FILTER + 12, &[6]).unwrap();
+    bench.pass(1_010);
+    assert_eq!(bench.device.outputs(), before);
+}
