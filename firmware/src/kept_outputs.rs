@@ -22,6 +22,8 @@ pub struct KeptOutputs {
     pub modules: u32,
     /// The outputs that a link held, by address, point 0 in bit 0.
     pub held: u32,
+    /// The outputs that were at SAFE and were not commanded since, by address, point 0 in bit 0.
+    pub at_safe: u32,
 }
 
 impl KeptOutputs {

@@ -11,7 +11,8 @@
 //!       98-113        what each output has: a half-word for each point, by address         of this run, or not valid
 //!       114           the modules in force, 4 bits for each port, port 1 lowest            as 98-113
 //!       115           outputs that a link holds, a bit for each point                      as 98-113
-//!       116-123       free
+//!       116           outputs that are at SAFE, a bit for each point                       as 98-113
+//!       117-123       free
 //!       124-127       marks of the tasks, a byte each                                    neither sealed nor live
 //! ```
 //!
@@ -57,10 +58,12 @@ const POINTS: usize = 32;
 const MODULES: usize = OUTPUTS + POINTS / 2;
 /// Word of the outputs that a link holds.
 const HELD: usize = MODULES + 1;
+/// Word of the outputs that are at SAFE.
+const AT_SAFE: usize = HELD + 1;
 /// First word of the marks.
 const MARKS: usize = WORDS - 4;
 /// Words of the region.
 const WORDS: usize = 128;
 
 // Every image of a board has the outputs at the same place.
-const _: () = assert!(OUTPUTS == 98 && HELD < MARKS && TASKS <= 4 * (WORDS - MARKS));
+const _: () = assert!(OUTPUTS == 98 && AT_SAFE < MARKS && TASKS <= 4 * (WORDS - MARKS));

@@ -12,7 +12,7 @@ use core::{
 };
 
 use super::{
-    COPY, HELD, MARKS, MODULES, OUTPUTS, POINTS, PULSES, UPTIME, WORDS, live,
+    AT_SAFE, COPY, HELD, MARKS, MODULES, OUTPUTS, POINTS, PULSES, UPTIME, WORDS, live,
     sealed::{
         self, AS_255, ASKED, CAUSE, CHOSEN, DEVELOPMENT, DIP, FLAGS, FRESH, HAS_DIP, RECORDS,
         SAVES, Sealed, UNSEEN,
@@ -206,14 +206,14 @@ fn half_word(point: usize) -> *mut u16 {
 }
 
 /// Returns what the outputs had at the reset, before the first [`keep_output`]: the half-word of each point, the modules
-/// that were in force, and the outputs that a link held. `None` after a power-on, and after an image that does not keep
-/// outputs.
+/// that were in force, the outputs that a link held, and those that were at SAFE. `None` after a power-on, and after an image
+/// that does not keep outputs.
 #[must_use]
-pub fn outputs() -> Option<([u16; POINTS], u32, u32)> {
+pub fn outputs() -> Option<([u16; POINTS], u32, u32, u32)> {
     // SAFETY: a half-word of RAM, which may hold any value. Volatile, because the value may be older than this start.
     let values = array::from_fn(|point| unsafe { ptr::read_volatile(half_word(point)) });
     let valid = Sealed::copy(0, read).has_outputs();
-    valid.then(|| (values, read(MODULES), read(HELD)))
+    valid.then(|| (values, read(MODULES), read(HELD), read(AT_SAFE)))
 }
 
 /// Keeps the half-word of an output, 0 to 31. For the scan, after every change.
@@ -222,9 +222,10 @@ pub fn keep_output(point: usize, value: u16) {
     unsafe { ptr::write_volatile(half_word(point), value) }
 }
 
-/// Keeps which outputs a link holds. For the scan, after every change.
-pub fn keep_held(outputs: u32) {
-    write(HELD, outputs);
+/// Keeps which outputs a link holds, and which are at SAFE. For the scan, after every change.
+pub fn keep_held([held, at_safe]: [u32; 2]) {
+    write(HELD, held);
+    write(AT_SAFE, at_safe);
 }
 
 /// Makes the outputs those of this run, with these modules in force. For the start, after all half-words have been kept.

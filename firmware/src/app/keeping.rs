@@ -14,8 +14,8 @@ use crate::board::{BOARD, Device};
 pub struct Kept {
     /// The digital and the analog outputs of each slot, channel 1 in bit 0.
     outputs: [[u8; 2]; SLOTS],
-    /// The outputs that a link holds, by address, as they were kept last.
-    held: u32,
+    /// The outputs that a link holds, and those that are at SAFE, by address, as they were kept last.
+    held: [u32; 2],
 }
 
 impl Kept {
@@ -28,7 +28,7 @@ impl Kept {
                 [Kind::BitOutput, Kind::WordOutput]
                     .map(|kind| ports.get(slot).map_or(0, |port| port.channels_of(kind)))
             }),
-            held: device.held_outputs(),
+            held: [device.held_outputs(), device.outputs_at_safe()],
         };
         if links::exist(SLOTS) {
             for (slot, ((port, outputs), dac)) in
@@ -48,7 +48,7 @@ impl Kept {
     }
 
     /// Keeps the outputs that a scan has driven: their channels, those with a pulse, which is over after a reset, the codes
-    /// of the DACs, and the outputs that a link holds.
+    /// of the DACs, and the outputs that a link holds and those that are at SAFE.
     // Not inlined into the scan, whose frame is large.
     #[inline(never)]
     pub fn keep(
@@ -56,11 +56,12 @@ impl Kept {
         channels: &[Channels; SLOTS],
         pulsing: &[u8; SLOTS],
         dacs: &[DacLink; SLOTS],
-        held: u32,
+        held: [u32; 2],
     ) {
-        // An output is marked as held only while its value is that of the link.
+        // An output is marked only while its value is that of the link, or SAFE.
         if self.held != held {
-            kept::keep_held(self.held & held);
+            let [before, now] = [self.held, held];
+            kept::keep_held([before[0] & now[0], before[1] & now[1]]);
         }
         let slots = channels.iter().zip(pulsing).zip(dacs).zip(&self.outputs);
         for (slot, (((channels, pulsing), dac), outputs)) in slots.enumerate() {

@@ -100,7 +100,8 @@ impl Scanning {
             for (pulsing, port) in pulsing.iter_mut().zip(ports) {
                 *pulsing = port.pulsing();
             }
-            (device.state.uptime_s(), device.held_outputs())
+            let held = [device.held_outputs(), device.outputs_at_safe()];
+            (device.state.uptime_s(), held)
         });
 
         let mut results = [Ok(()); SLOTS];

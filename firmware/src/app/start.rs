@@ -131,10 +131,11 @@ pub fn up(
     } else {
         None
     };
-    let kept = kept.map(|(values, modules, held)| KeptOutputs {
+    let kept = kept.map(|(values, modules, held, at_safe)| KeptOutputs {
         values,
         modules,
         held,
+        at_safe,
     });
     let stored = if KEEPS_OUTPUTS {
         store.outputs(&pages)

@@ -15,6 +15,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
     ///
     /// - An output that is to start as it was has its kept value, else its stored one.
     /// - An output that a link held has its kept value, if it still has such a link.
+    /// - One that is at SAFE still counts as commanded what is stored.
     /// - Every other output keeps START.
     #[inline(never)]
     pub fn start_outputs(&mut self, kept: Option<&KeptOutputs>, stored: Option<&Record<'_>>) {
@@ -31,11 +32,12 @@ impl<const SLOTS: usize> Device<SLOTS> {
             *held = (kept.held >> (first & 31)) as u8 & self.linking.with_any_level(slot);
             for channel in 0..CHANNELS {
                 let is_held = *held >> channel & 1 != 0;
+                let point = first.wrapping_add(channel as u16);
                 if (is_held || self.kept_at(slot, channel).is_some())
-                    && let Some(value) = kept.value(first.wrapping_add(channel as u16))
-                    && let Some(port) = self.points.ports_mut().get_mut(slot)
+                    && let Some(value) = kept.value(point)
                 {
-                    port.command_raw(channel, value);
+                    let at_safe = kept.at_safe >> (point & 31) & 1 != 0;
+                    self.points.return_to(slot, channel, value, at_safe);
                 }
             }
         }
@@ -61,6 +63,12 @@ impl<const SLOTS: usize> Device<SLOTS> {
         (0..SLOTS).fold(0, |mask, slot| {
             mask | u32::from(self.linking.to_keep(slot)) << (self.points.first_of(slot) & 31)
         })
+    }
+
+    /// Returns the outputs, by address, that are at SAFE and were not commanded since.
+    #[must_use]
+    pub fn outputs_at_safe(&self) -> u32 {
+        self.points.at_safe() << (self.points.first_of(0) & 31)
     }
 
     /// Returns what a master or a link commanded last of the outputs that are to start as they were, to be stored. Those

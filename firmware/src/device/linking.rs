@@ -45,7 +45,7 @@ impl<const SLOTS: usize> Linking<SLOTS> {
         self.outputs.get(slot).map_or(0, Outputs::to_keep)
     }
 
-    /// Returns the outputs of a slot that a link holds that always acts, channel 1 in bit 0.
+    /// Returns the outputs of a slot that a link holds or will hold that always acts, channel 1 in bit 0.
     pub fn held_always(&self, slot: usize) -> u8 {
         self.outputs.get(slot).map_or(0, Outputs::held_always)
     }
@@ -175,7 +175,12 @@ impl<const SLOTS: usize> Device<SLOTS> {
         if let Some(port) = self.points.ports_mut().get_mut(slot) {
             port.end_pulses(now);
         }
-        if self.linking.outputs.get(slot).is_some_and(Outputs::exist) {
+        if self
+            .linking
+            .outputs
+            .get(slot)
+            .is_some_and(Outputs::are_to_run)
+        {
             self.run_slot(slot, now);
         }
     }

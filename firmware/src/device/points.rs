@@ -252,6 +252,22 @@ impl<const SLOTS: usize> Points<SLOTS> {
         }
     }
 
+    /// Sets an output to the raw value that it had before a reset. `at_safe`: that was SAFE, so what was commanded before
+    /// still counts as commanded.
+    pub(super) fn return_to(&mut self, slot: usize, channel: usize, value: u16, at_safe: bool) {
+        let index = slot * CHANNELS + channel;
+        let before = self.commanded(index);
+        if let Some((port, channel)) = self.place_mut(index) {
+            port.command_raw(channel, value);
+            if at_safe {
+                port.keep_before_safe(channel, before);
+            }
+        }
+        for marks in &mut self.at_safe {
+            *marks |= u32::from(at_safe) << (index & 31);
+        }
+    }
+
     /// Returns what a master or a link commanded last of the output with this index, not SAFE: 0 or 1 for a bit, 0 to 4095
     /// raw for a word. A pulse counts as ended.
     pub(super) fn commanded(&self, index: usize) -> u16 {
@@ -267,7 +283,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
 
     /// Returns the outputs that are at SAFE and were not commanded since.
     #[inline(always)]
-    fn at_safe(&self) -> u32 {
+    pub(super) fn at_safe(&self) -> u32 {
         self.at_safe.first().copied().unwrap_or_default()
     }
 

@@ -258,11 +258,16 @@ impl IoPort {
         let Some(value) = self.safe.get(channel).copied().flatten() else {
             return false;
         };
+        self.keep_before_safe(channel, before);
+        self.command_raw(channel, value);
+        true
+    }
+
+    /// Keeps what was commanded, raw, before an output was set to SAFE.
+    pub(super) fn keep_before_safe(&mut self, channel: usize, before: u16) {
         if let Some(place) = self.before_safe.get_mut(channel) {
             *place = before;
         }
-        self.command_raw(channel, value);
-        true
     }
 
     /// Returns the state of the module.

@@ -57,8 +57,6 @@ pub(crate) struct Outputs {
     held: u8,
     /// Outputs that are held on.
     on: u8,
-    /// Outputs that are held always, whether the watchdog has expired or not.
-    always: u8,
     /// Outputs that were held, and whose links do not know yet whether they still are.
     kept: u8,
 }
@@ -80,15 +78,14 @@ impl Outputs {
             resting: 0,
             held: 0,
             on: 0,
-            always: 0,
             kept: 0,
         }
     }
 
-    /// Returns whether there is a link.
+    /// Returns whether the links are to run: there is one, or one that has gone still holds an output.
     #[must_use]
-    pub const fn exist(&self) -> bool {
-        self.levels | self.edges != 0
+    pub const fn are_to_run(&self) -> bool {
+        self.levels | self.edges | self.held | self.kept != 0
     }
 
     /// Returns the level links.
@@ -237,7 +234,6 @@ impl Outputs {
         let part = acting & self.known;
         self.held = of_outputs(part) & !unknown;
         self.on = of_outputs(part & self.want) & self.held;
-        self.always = of_outputs(part & !self.alone) & self.held;
         self.kept = self.held | self.kept & unknown;
     }
 
@@ -253,10 +249,10 @@ impl Outputs {
         self.on
     }
 
-    /// Returns the outputs that a link holds that always acts.
+    /// Returns the outputs that a link holds that always acts, or will hold once it acts and knows what it wants.
     #[must_use]
     pub const fn held_always(&self) -> u8 {
-        self.always
+        of_outputs(self.levels & !self.alone & !self.absent)
     }
 
     /// Returns the outputs that are to have after a reset what they have now, because a link holds them, or did so before

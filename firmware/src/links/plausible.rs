@@ -3,9 +3,13 @@
 //! open circuit.
 
 use modio_drivers::{ChannelSettings, Code, input_status};
+use register_map::limits::LOW_PASS_MAX;
 
-/// Number of implausible codes that make an input bad, and of plausible ones in a row that make it good.
-pub const CODES: u8 = 10;
+/// Number of implausible codes that make an input bad, and of plausible ones in a row after which it is so no more.
+pub const CODES: u16 = 10;
+
+/// Time constants of the low-pass after which nothing is left in the word of fewer than [`CODES`] implausible codes.
+const SETTLED: u16 = 5;
 
 /// The codes of an analog input.
 ///
@@ -14,9 +18,9 @@ pub const CODES: u8 = 10;
 #[derive(Debug)]
 pub(super) struct Plausible {
     /// Number of implausible codes since the input was good, at most [`CODES`].
-    implausible: u8,
+    implausible: u16,
     /// Number of plausible codes since the last implausible one.
-    in_a_row: u8,
+    in_a_row: u16,
 }
 
 impl Plausible {
@@ -29,20 +33,26 @@ impl Plausible {
     }
 
     /// Adds the code of a scan. Implausible codes need not follow each other: of a wire that opens and closes many times a
-    /// second, a part of the codes is plausible.
+    /// second, a part of the codes is plausible. An input that did not become bad is good when the low-pass has forgotten
+    /// them; one that was bad waits for longer anyway.
     pub fn add(&mut self, code: u16, settings: &ChannelSettings) {
         if input_status::is_implausible(Code::new(code), settings) {
             self.implausible = (self.implausible + 1).min(CODES);
             self.in_a_row = 0;
         } else if self.implausible > 0 {
             self.in_a_row += 1;
-            if self.in_a_row >= CODES {
+            let settling = if self.is_bad() {
+                0
+            } else {
+                SETTLED << settings.filter.min(LOW_PASS_MAX)
+            };
+            if self.in_a_row >= CODES + settling {
                 self.implausible = 0;
             }
         }
     }
 
-    /// Returns whether the input is good: no code was implausible, or ten in a row were plausible since then.
+    /// Returns whether the input is good: no code was implausible, or enough in a row were plausible since then.
     pub const fn is_good(&self) -> bool {
         self.implausible == 0
     }
@@ -64,9 +74,10 @@ mod tests {
     const CUT: u16 = 4_095;
 
     #[test]
-    fn input_is_bad_after_ten_implausible_codes_and_good_after_ten_plausible_ones_in_a_row() {
+    fn input_is_bad_after_ten_implausible_codes_and_good_after_plausible_ones_in_a_row() {
         let settings = ChannelSettings {
             signal: Signal::Ntc,
+            filter: 0,
             ..ChannelSettings::default_for(Kind::WordInput)
         };
         let mut input = Plausible::new();
@@ -77,7 +88,7 @@ mod tests {
         let [good, uncertain, bad] = [(true, false), (false, false), (false, true)];
         assert_eq!(add(WARM, 1), good);
         assert_eq!([add(CUT, 1), add(CUT, 8)], [uncertain; 2]);
-        assert_eq!([add(WARM, 9), add(WARM, 1)], [uncertain, good]);
+        assert_eq!([add(WARM, 14), add(WARM, 1)], [uncertain, good]);
         assert_eq!([add(CUT, 9), add(WARM, 1)], [uncertain; 2]);
         assert_eq!([add(CUT, 1), add(CUT, 255)], [bad; 2], "nine and one");
         assert_eq!([add(WARM, 9), add(CUT, 1)], [bad; 2]);

@@ -237,6 +237,7 @@ impl Unit {
             values,
             modules: self.bench.device.modules_in_force(),
             held: self.bench.device.held_outputs(),
+            at_safe: self.bench.device.outputs_at_safe(),
         }
     }
 

@@ -162,6 +162,7 @@ fn kept(bench: &Bench<4>) -> KeptOutputs {
         values,
         modules: bench.device.modules_in_force(),
         held: bench.device.held_outputs(),
+        at_safe: bench.device.outputs_at_safe(),
     }
 }
 
@@ -239,4 +240,42 @@ fn saved_settings_alone_decide_which_outputs_are_stored() {
     assert_eq!(bench.device.outputs().len(), 1);
     bench.write(at::COMMAND, &[1]).unwrap();
     assert!(bench.device.outputs().is_empty());
+}
+
+#[test]
+fn output_that_a_link_always_holds_uses_no_record_while_its_link_begins_again() {
+    let mut bench = keeping(&[]);
+    bench.unlock();
+    let link = [12, LinkAction::Follow.code(), 0, 0];
+    bench.write(links::of_point(3, false), &link).unwrap();
+    bench.pass(1_010);
+    let before = bench.device.outputs();
+    // A master that sets its link again.
+    bench.write(links::of_point(3, false), &link).unwrap();
+    bench.pass(10);
+    assert_eq!(bench.device.outputs(), before, "while it rests");
+    bench.write(at::FILTER + 12, &[6]).unwrap();
+    bench.pass(1_010);
+    assert_eq!(bench.device.outputs(), before);
+}
+
+#[test]
+fn safe_is_not_stored_as_commanded_after_a_reset_that_kept_it() {
+    let stored = [(at::COMM_TIMEOUT, 5), (at::SAFE + 8, 50)];
+    let mut bench = keeping(&stored);
+    bench.set(0, true);
+    bench.write(8, &[100]).unwrap();
+    let commanded = bench.device.outputs();
+    let now = bench.device.state.millis();
+    bench.device.request_seen(now, true);
+    assert!(bench.device.tick(500));
+    assert_eq!(bench.device.outputs(), commanded);
+    let mut page = [0xFF; 200];
+    encode_page(0, &commanded, &mut page).unwrap();
+    let (_, record) = records(&page).next().unwrap();
+    let mut next = keeping(&stored);
+    next.device
+        .start_outputs(Some(&kept(&bench)), Some(&record));
+    assert_eq!(next.values(), (0, std::vec![50, 0, 0, 0]), "SAFE included");
+    assert_eq!(next.device.outputs(), commanded, "SAFE was never commanded");
 }

@@ -338,3 +338,30 @@ fn heater_works_again_a_minute_after_its_sensor_was_mended() {
     assert_eq!(sensor.scan((0..60_000).map(|_| 3_156)), 0);
     assert!(sensor.scan((0..2_000).map(|_| 3_156)) > 900);
 }
+
+#[test]
+fn output_is_the_masters_again_after_the_last_link_of_its_slot_has_gone() {
+    let mut bench = linked(link(0, Follow, [0; 2]), NONE);
+    bench.input(0, true);
+    assert!(bench.device.driven(1).bit(0));
+    // ACTION 0.
+    bench
+        .write(links::of_point(OUTPUT, false) + 1, &[0])
+        .unwrap();
+    bench.pass(2_000);
+    bench.write_output(false);
+    bench.pass(1);
+    assert!(!bench.device.driven(1).bit(0), "the terminal");
+    assert_eq!(bench.device.held_outputs(), 0);
+}
+
+#[test]
+fn wire_that_is_open_for_a_few_scans_again_and_again_switches_no_heater_on() {
+    // Once in 1,009 scans, so that the links look at each distance from it. And 50 times a second for a quarter of the time.
+    for (filter, open, of, ms) in [(4, 9, 1_009, 400_000), (4, 5, 20, 9_000), (8, 5, 20, 9_000)] {
+        let mut sensor = Sensor::new(2, filter, link(ANALOG, Invert, [180, 150]));
+        sensor.scan((0..3_000).map(|_| 2_269));
+        let codes = (0..ms).map(|ms| if ms % of < open { 4_095 } else { 2_269 });
+        assert_eq!(sensor.scan(codes), 0, "filter {filter}, {open} of {of} ms");
+    }
+}
