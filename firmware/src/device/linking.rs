@@ -128,7 +128,9 @@ impl<const SLOTS: usize> Device<SLOTS> {
             let port = self.points.ports().get(slot);
             if let (Some(outputs), Some(port)) = (self.linking.outputs.get_mut(slot), port) {
                 outputs.set_up(links);
-                outputs.forget(of_changed, port.channels().bits());
+                // A held output has what its links want, whatever this request has written.
+                let on = port.channels().bits() & !outputs.held() | outputs.held_on();
+                outputs.forget(of_changed, on);
                 outputs.written(written);
             }
         }
