@@ -93,6 +93,8 @@ block! {
     UNIT "UNIT": 0x010A x 1, Value::NUMBER, Rule::restart(Values::range(1, 247), 1);
     /// Low word of the serial number; 0 = from the unique identity
     SERIAL_LOW "SERIAL_LOW": 0x010B x 1, Value::NUMBER, Rule::restart(Values::ANY, 0);
+    /// Only restarts COMM_TIMEOUT, without KEY. Reads 0
+    HEARTBEAT "HEARTBEAT": 0x010C x 1, Value::NUMBER, Rule::now(Values::ANY, 0);
     /// Module in the slot
     MODULE "MODULE": 0x0110 x 8, Value::Codes(Module::NAMES), Rule::restart(Values::up_to(Module::LAST), 0);
     /// Debounce, or low-pass over 2^n samples

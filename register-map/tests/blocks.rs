@@ -71,6 +71,7 @@ const CONFIGURATION: &[Expected] = &[
     (0x0109, 1, &[0, 1, 2, 3], &[4, 0xFFFF], 0, NOW),
     (0x010A, 1, &[1, 247], &[0, 248, 0xFFFF], 1, RESTART),
     (0x010B, 1, &[0, 1, 0xFFFF], &[], 0, RESTART),
+    (0x010C, 1, &[0, 1, 0xFFFF], &[], 0, NOW),
     (0x0110, 8, &[0, Module::LAST], &[Module::LAST + 1, 0xFFFF], 0, RESTART),
     (0x0120, 32, &[0, 1000], &[1001, 0xFFFF], 5, NOW),
     (0x0140, 1, &[0, 1, 2], &[3], 0, RESTART),

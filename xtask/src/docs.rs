@@ -32,9 +32,13 @@ front: 0x0010 is then 17, 00017 or 10017 as a bit, and 40017 or 30017 as a word.
 ";
 
 const CONFIGURATION_NOTES: &str = "
-- Every write to this block except to KEY needs the open lock, COMMAND included. Otherwise it is exception 06. The state
-  of the lock when the request arrives counts: a request with KEY and a setting needs an open lock already. A refused
-  write does not open the lock and does not keep it open. A value of KEY other than 0x5A17 is exception 03.
+- Every write to this block except to KEY or HEARTBEAT alone needs the open lock, COMMAND included. Otherwise it is
+  exception 06. The state of the lock when the request arrives counts: a request with KEY and a setting needs an open
+  lock already. A refused write does not open the lock and does not keep it open. A value of KEY other than 0x5A17 is
+  exception 03.
+- HEARTBEAT takes any value, which has no effect and is not stored. Its write counts for COMM_SOURCE as every write does
+  ([safety.md](safety.md#a-heartbeat)). Alone in its request it is accepted over every line, with LORA 2 too, and as a
+  broadcast. It does not keep the lock open.
 - A written value reads back immediately. \"now\" is in force immediately. \"restart\" is in force after the next start, if
   the value was saved before it.
 - The response to COMMAND is sent before the command is executed. While a save runs, another save is exception 06 and a
@@ -47,8 +51,9 @@ const CONFIGURATION_NOTES: &str = "
   writes nothing is always possible and does not count. The number of saves left survives every reset but a power-on.
 - START = 0xFFFE, *as it was*, exists on boards with more than 128 KiB of flash: not on the modio-02 and the eth-io5r,
   where it is exception 03. [safety.md](safety.md#outputs-as-they-were) says which value an output then has.
-- A broadcast over the air writes nothing here: it is exception 06, which is not sent. With LORA 2 no write over the air
-  is accepted here at all, and neither the clearing of pulse counters nor function 08 except 00, 02 and 0B-12.
+- A broadcast over the air writes nothing here but HEARTBEAT: it is exception 06, which is not sent. With LORA 2 no other
+  write over the air is accepted here at all, and neither the clearing of pulse counters nor function 08 except 00, 02
+  and 0B-12.
 - FRAME_GAP counts as 1.5 characters when it is shorter than that at the rate in force.
 - Identify (6): all LEDs blink together for 10 s, and then show the state of the device again. Another identify starts
   the 10 s again.

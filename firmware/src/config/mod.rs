@@ -31,8 +31,9 @@ use core::array;
 use modbus_server::{Exception, Span, Words, WordsOut};
 use register_map::codes::{CommSource, Command, Lora};
 use register_map::configuration::{
-    AS_IT_WAS, COMM_SOURCE, COMM_TIMEOUT, COMMAND, FILTER, FORMAT, KEY, LORA, LORA_FRAME_GAP, MODE,
-    MODULE, RANGE, RESPONSE_DELAY, RULES, SAVE_EVERY_S, SAVES, SERIAL_LOW, START, UNIT,
+    AS_IT_WAS, COMM_SOURCE, COMM_TIMEOUT, COMMAND, FILTER, FORMAT, HEARTBEAT, KEY, LORA,
+    LORA_FRAME_GAP, MODE, MODULE, RANGE, RESPONSE_DELAY, RULES, SAVE_EVERY_S, SAVES, SERIAL_LOW,
+    START, UNIT,
 };
 use register_map::state::status;
 use register_map::{Board, Module, Run, Runs, links as links_map, runs};
@@ -46,7 +47,7 @@ use lock::Lock;
 pub use origin::{LineName, Origin};
 pub use settings::RestartValues;
 use settings::{
-    RESTARTS, format_suits_mode, has_deadband, port_of, restart_addresses, takes_module,
+    RESTARTS, format_suits_mode, has_deadband, is_setting, port_of, restart_addresses, takes_module,
 };
 pub use settings::{Settings, kinds};
 
@@ -60,6 +61,9 @@ enum Save {
     /// The settings to be stored are set aside.
     Begun,
 }
+
+/// A write that does nothing. It needs no lock, and every line may make it.
+const HEARTBEAT_ALONE: Span = Span::single(HEARTBEAT);
 
 /// Checks whether registers of DEADBAND exist. The first one does.
 ///
@@ -244,7 +248,11 @@ impl<const SLOTS: usize> Config<SLOTS> {
     /// the module chosen last does not allow, and a FORMAT with seven data bits in RTU mode; 06 for a broadcast over
     /// the air or a line that may not write here, when the lock is closed for the line and the request does not write
     /// KEY alone, or when a save is ordered before the previous one is complete or with nothing left of the budget.
+    /// HEARTBEAT alone is always allowed.
     pub fn check_write(&self, span: Span, words: Words<'_>) -> Result<(), Exception> {
+        if span == HEARTBEAT_ALONE {
+            return Ok(());
+        }
         let suits = if Links::<SLOTS>::contain(span.start()) {
             self.check_links(span)?;
             self.suits_the_links(span, words)
@@ -291,7 +299,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
             return true;
         }
         let written = span.addresses().zip(words.iter());
-        let settings = written.filter(|(address, _)| ![KEY, COMMAND].contains(address));
+        let settings = written.filter(|(address, _)| is_setting(*address));
         let differences = settings.fold(self.differences, |differences, (address, value)| {
             let saved = self.saved.get(address);
             differences
@@ -347,15 +355,18 @@ impl<const SLOTS: usize> Config<SLOTS> {
         }
     }
 
-    /// Writes registers that [`Self::check_write`] has accepted, and opens the lock or keeps it open. Returns the
-    /// command to execute, if one was written. The caller must execute it after the response has been sent and
-    /// before the next request.
+    /// Writes registers that [`Self::check_write`] has accepted, and opens the lock or keeps it open. HEARTBEAT alone
+    /// does nothing. Returns the command to execute, if one was written. The caller must execute it after the response
+    /// has been sent and before the next request.
     ///
     /// - [`Command::Save`]: [`Self::begin_save`], then the save itself.
     /// - [`Command::LoadDefaults`], [`Command::DropChanges`]: the method of that name.
     /// - [`Command::Restart`]: only when no save is running, [`Self::is_saving`].
     #[must_use = "the caller must execute the command"]
     pub fn write(&mut self, span: Span, words: Words<'_>) -> Option<Command> {
+        if span == HEARTBEAT_ALONE {
+            return None;
+        }
         self.lock.open(self.origin.line);
         let mut command = None;
         if (FILTER..links_map::LINKS).contains(&span.start()) || has_deadband(span.start()) {
@@ -367,7 +378,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
         } else {
             for (address, value) in span.addresses().zip(words.iter()) {
                 match address {
-                    KEY => {}
+                    KEY | HEARTBEAT => {}
                     COMMAND => command = Command::from_code(value),
                     _ => self.edited.set(address, value),
                 }

@@ -3,7 +3,7 @@
 use modio_drivers::CHANNELS;
 use register_map::codes::{Format, Mode};
 use register_map::configuration::{
-    self, COMMAND, FORMAT, KEY, MODE, MODULE, RANGE, RULES, module_of,
+    self, COMMAND, FORMAT, HEARTBEAT, KEY, MODE, MODULE, RANGE, RULES, module_of,
 };
 use register_map::deadband::{self, DEADBAND};
 use register_map::points::{self, Kind};
@@ -37,7 +37,7 @@ pub struct RestartValues(pub(super) [u16; RESTARTS]);
 #[repr(align(4))]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings<const SLOTS: usize> {
-    /// See [`place`]. KEY, COMMAND and gaps hold 0.
+    /// See [`place`]. KEY, COMMAND, HEARTBEAT and gaps hold 0.
     values: [u16; VALUES],
     board: &'static Board,
     pub(super) links: Links<SLOTS>,
@@ -153,7 +153,8 @@ impl<const SLOTS: usize> Settings<SLOTS> {
         }
     }
 
-    /// Returns `count` values from an address on, to be changed. The range must not contain MODULE, KEY or COMMAND.
+    /// Returns `count` values from an address on, to be changed. The range must not contain MODULE, KEY, COMMAND or
+    /// HEARTBEAT.
     #[inline]
     pub(super) fn slice_mut(&mut self, start: u16, count: u16) -> &mut [u16] {
         let start = place(start);
@@ -318,9 +319,14 @@ pub(super) fn port_of(address: u16) -> Option<u16> {
     (index < points::PORTS).then_some(index + 1)
 }
 
+/// Returns whether a register of the configuration holds a setting.
+pub(super) const fn is_setting(address: u16) -> bool {
+    !matches!(address, KEY | COMMAND | HEARTBEAT)
+}
+
 /// Returns whether the registers of a rule hold a setting.
 const fn holds(rule: &Rule) -> bool {
-    rule.first != KEY && rule.first != COMMAND
+    is_setting(rule.first)
 }
 
 /// Iterates over the addresses of the settings that need a restart.

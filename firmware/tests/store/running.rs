@@ -2,7 +2,7 @@
 
 use firmware::store::{Given, Saving, Store, WriteError};
 use register_map::board::MODIO_02;
-use register_map::configuration::{COMMAND, KEY, RULES, module_of};
+use register_map::configuration::{COMMAND, HEARTBEAT, KEY, RULES, module_of};
 use register_map::record::OUTPUTS;
 use register_map::{Module, rule_at};
 
@@ -99,7 +99,7 @@ pub fn random_settings(seed: u64, changed: usize) -> Settings {
     let mut noise = Noise(seed);
     let rules = RULES
         .iter()
-        .filter(|rule| ![KEY, COMMAND].contains(&rule.first));
+        .filter(|rule| ![KEY, COMMAND, HEARTBEAT].contains(&rule.first));
     let addresses: Vec<u16> = rules.flat_map(|rule| rule.addresses()).collect();
     let mut pairs = vec![(MODULE_SLOT, noise.next() as u16 % 7)];
     for _ in 0..changed {
@@ -117,7 +117,7 @@ pub fn fullest_settings(seed: u64) -> Settings {
     let mut pairs = vec![(MODULE_SLOT, Module::Ao4.code())];
     for rule in RULES
         .iter()
-        .filter(|rule| ![KEY, COMMAND].contains(&rule.first))
+        .filter(|rule| ![KEY, COMMAND, HEARTBEAT].contains(&rule.first))
     {
         for address in rule.addresses().filter(|address| *address != MODULE_SLOT) {
             pairs.extend(some_value(address, &mut noise).map(|value| (address, value)));

@@ -393,9 +393,9 @@ pub fn is_module(item: &Item) -> bool {
     (MODULE..MODULE + points::PORTS).contains(&item.address)
 }
 
-/// Returns whether a writable register is a setting, and not the lock, a command or a counter.
+/// Returns whether a writable register is a setting, and not the lock, a command, a heartbeat or a counter.
 fn is_setting(register: &Register) -> bool {
-    !matches!(register.name.as_str(), "KEY" | "COMMAND")
+    !matches!(register.name.as_str(), "KEY" | "COMMAND" | "HEARTBEAT")
         && !matches!(register.value, Value::Long(_))
 }
 
@@ -472,6 +472,7 @@ mod tests {
         let book = Book::new(describe(&FX3U_24, "0.1.0", module), vec![(0, 0); 32]);
         for (name, setting) in [
             ("UNIT", Some(true)),
+            ("HEARTBEAT", Some(false)),
             ("p7.2", Some(false)),
             ("p7.3", None),
             ("p7.2.safe", Some(true)),

@@ -9,7 +9,7 @@ use super::*;
 type Settings = super::Settings<1>;
 use register_map::board::{MODIO_02, MODIO_08};
 use register_map::configuration::{
-    BAUD, FILTER, HOLD, LORA_ADDRESS, RANGE, SAFE, START, module_of,
+    BAUD, FILTER, HEARTBEAT, HOLD, LORA_ADDRESS, RANGE, SAFE, START, module_of,
 };
 
 use register_map::record::{FIRST_OFFSET, OVERHEAD};
@@ -96,6 +96,7 @@ fn a_value_not_allowed_is_counted_and_an_unknown_address_is_ignored() {
         (0x010A, 1),
         (KEY, 0x5A17),
         (COMMAND, 1),
+        (HEARTBEAT, 1),
         (0x0200, 1),
         (0xFFFF, 0xFFFF),
         (MODULE_SLOT, 2),

@@ -110,6 +110,16 @@ fn unit_exists_without_a_switch_and_lora_with_a_radio() {
 }
 
 #[test]
+fn heartbeat_in_a_request_with_a_save_is_no_change_that_costs_one() {
+    let mut config = on::<4>(&ETH_IO5R, &[]);
+    config.set_saves_left(0);
+    assert_eq!(write(&mut config, KEY, &[OPENING_KEY]), DONE);
+    // COMMAND to HEARTBEAT.
+    let saved = write(&mut config, COMMAND, &[1, 0, 1, 0, 9]);
+    assert_eq!(saved, Ok(Some(Command::Save)));
+}
+
+#[test]
 fn address_is_written_by_serial_number_and_stored_alone() {
     let mut config = on::<4>(&ETH_IO5R, &[]);
     assert_eq!(

@@ -82,6 +82,54 @@ fn a_broadcast_over_rs232_writes_as_one_over_the_cable_does() {
 }
 
 #[test]
+fn heartbeat_is_a_write_without_effect_over_every_line_and_with_any_lock() {
+    for lora in [0, 1, 2] {
+        let mut config = config(&[(LORA, lora)]);
+        for (opened, origin) in [LineName::Rs485, LineName::Second]
+            .into_iter()
+            .flat_map(|line| [false, true].map(|opened| (opened, line)))
+        {
+            config.set_origin(OVER_THE_CABLE);
+            if opened {
+                assert_eq!(write(&mut config, KEY, &[OPENING_KEY]), DONE);
+            }
+            config.tick(30_000);
+            let (before, revision) = (all(&config), config.revision());
+            for broadcast in [false, true] {
+                config.set_origin(Origin {
+                    line: origin,
+                    broadcast,
+                    by_serial: false,
+                });
+                for value in [0, 1, 0xFFFF] {
+                    assert_eq!(write(&mut config, HEARTBEAT, &[value]), DONE);
+                }
+                assert_eq!(read(&config, HEARTBEAT, 1), Ok(std::vec![0]));
+            }
+            assert_eq!((all(&config), config.revision()), (before, revision));
+            assert_eq!(status(&config), 0, "there is nothing to save");
+            assert_eq!(is_open(&mut config, OVER_THE_CABLE), opened);
+            config.tick(30_000);
+            assert!(!is_open(&mut config, OVER_THE_CABLE), "not kept open");
+        }
+    }
+}
+
+#[test]
+fn heartbeat_with_another_register_needs_the_lock_and_is_not_saved() {
+    let mut config = config(&[]);
+    assert_eq!(write(&mut config, SERIAL_LOW, &[7, 1]), LOCKED);
+    assert_eq!(write(&mut config, SERIAL_LOW, &[7, 1, 1]), ADDRESS);
+    assert_eq!(write(&mut config, KEY, &[OPENING_KEY]), DONE);
+    assert_eq!(write(&mut config, SERIAL_LOW, &[7, 1]), DONE);
+    assert_eq!(read(&config, SERIAL_LOW, 2), Ok(std::vec![7, 0]));
+    assert!(config.to_save().changed_from(KEY).next().is_none());
+    save(&mut config);
+    let saved: Vec<_> = config.to_save().changed_from(KEY).collect();
+    assert_eq!(saved, [(SERIAL_LOW, 7)]);
+}
+
+#[test]
 fn air_for_points_and_reads_only_opens_no_lock_and_takes_no_command() {
     let mut config = config(&[(LORA, 2)]);
     assert!(config.air_serves_points_only());

@@ -24,7 +24,7 @@ fn every_setting_takes_the_ends_of_its_range_and_nothing_beyond() {
     let mut settings = Vec::new();
     for rule in RULES
         .iter()
-        .filter(|rule| ![KEY, COMMAND, UNIT].contains(&rule.first))
+        .filter(|rule| ![KEY, COMMAND, HEARTBEAT, UNIT].contains(&rule.first))
     {
         settings.extend(rule.addresses().map(|address| (rule, address)));
     }

@@ -35,6 +35,21 @@ fn points_only_refuses_key_command_and_clearing_of_counters_with_exception_06() 
 }
 
 #[test]
+fn points_only_takes_a_heartbeat_by_every_function_that_writes_registers() {
+    let mut bench = bench(2);
+    for pdu in [
+        &[6, 1, 0x0C, 0xFF, 0xFF][..],
+        &[0x16, 1, 0x0C, 0, 0, 0x12, 0x34],
+    ] {
+        assert_eq!(bench.ask(pdu), pdu);
+    }
+    assert_eq!(bench.write(at::HEARTBEAT, &[7]), Ok(()));
+    let with_read = [0x17, 1, 0x0C, 0, 1, 1, 0x0C, 0, 1, 2, 0, 7];
+    assert_eq!(bench.ask(&with_read), [0x17, 2, 0, 0]);
+    assert_eq!(bench.write(at::SERIAL_LOW, &[0, 7]), Err(6));
+}
+
+#[test]
 fn radio_with_settings_takes_key_and_clears_counters() {
     let mut bench = bench(1);
     assert_eq!(bench.write(0x0320, &[0, 0]), Ok(()));

@@ -13,6 +13,7 @@ mod fast;
 mod files;
 mod framing;
 mod gaps;
+mod heartbeat;
 mod hurts;
 mod identification;
 mod line_counters;
@@ -57,6 +58,7 @@ pub fn all() -> Vec<Case> {
         worked::CASES,
         hurts::CASES,
         outputs::CASES,
+        heartbeat::CASES,
         configuration::CASES,
         power::CASES,
         settings::CASES,

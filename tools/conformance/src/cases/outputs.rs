@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use register_map::codes::CommSource;
 use register_map::configuration::{self, AS_IT_WAS};
 use register_map::points::Kind;
 use register_map::state;
@@ -20,6 +21,9 @@ pub(super) const CASES: &[Case] = &[
         line_dies),
     case("outputs/stay-while-the-line-lives", "map, communication watchdog",
         "requests and broadcasts within COMM_TIMEOUT keep outputs as they are", N, line_lives),
+    case("outputs/stay-while-heartbeats-come", "map, 0x010C",
+        "with COMM_SOURCE 1 HEARTBEAT within COMM_TIMEOUT, also as a broadcast, keeps outputs as they are", N,
+        heartbeats_come),
     case("outputs/inputs-take-no-writes", "map, points",
         "writing an input point is exception 02, by every function that writes", &[Need::Modio], inputs),
     case("outputs/start-value", "map, 0x01E0", "at power-on outputs are at START", &[Need::Modio, Need::Power],
@@ -156,6 +160,35 @@ fn line_lives(bench: &mut Bench<'_>) -> Check {
         let now = read(bench, function, address)?;
         bench.ensure(now == high, "the output as written")
     });
+    write(bench, function, address, before.min(high))?;
+    result
+}
+
+fn heartbeats_come(bench: &mut Bench<'_>) -> Check {
+    let (function, address, high) = output(bench)?;
+    let before = read(bench, function, address)?;
+    let source = bench.read_word(configuration::COMM_SOURCE)?;
+    let tenths = tenths(bench, 10);
+    set(bench, configuration::COMM_SOURCE, CommSource::Writes.code())?;
+    let result = with_timeout(bench, tenths, address, |bench, timeout| {
+        let (function, address, high) = output(bench)?;
+        write(bench, function, address, high)?;
+        for value in 0..8 {
+            bench.rest(timeout / 4)?;
+            let request = pdu(6, configuration::HEARTBEAT, value);
+            bench.reply_is(&request, &request)?;
+        }
+        for value in 0..8 {
+            bench.rest(timeout / 4)?;
+            let request = pdu(6, configuration::HEARTBEAT, value);
+            bench.silence_of(0, &request, "a broadcast")?;
+        }
+        let tripped = has_tripped(bench)?;
+        bench.ensure(!tripped, "status bit 0 clear: HEARTBEAT is a write")?;
+        let now = read(bench, function, address)?;
+        bench.ensure(now == high, "the output as written")
+    });
+    set(bench, configuration::COMM_SOURCE, source)?;
     write(bench, function, address, before.min(high))?;
     result
 }

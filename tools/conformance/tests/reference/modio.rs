@@ -131,8 +131,8 @@ impl Modio {
         Duration::from_millis(self.edited[&at::RESPONSE_DELAY].into())
     }
 
-    /// Notes a valid request for this unit, or a broadcast, at this instant.
-    pub fn request(&mut self, at: Duration, broadcast: bool) {
+    /// Notes a valid request for this unit, or a broadcast, at this instant. COMM_SOURCE has no effect.
+    pub fn request(&mut self, at: Duration, broadcast: bool, pdu: &[u8]) {
         self.now = at;
         let timeout = Duration::from_millis(100) * u32::from(self.edited[&at::COMM_TIMEOUT]);
         let dead = !timeout.is_zero() && at > self.last + timeout;
@@ -153,7 +153,10 @@ impl Modio {
                 }
             }
         }
-        if !broadcast || !self.has(ModioFault::BroadcastsAreNoLife) {
+        let is_heartbeat = pdu.starts_with(&[6, 1, 0x0C]);
+        if !(broadcast && self.has(ModioFault::BroadcastsAreNoLife)
+            || is_heartbeat && self.has(ModioFault::HeartbeatsAreNoLife))
+        {
             self.last = at;
         }
     }
@@ -310,6 +313,9 @@ impl Modio {
             return Ok(());
         }
         runs(at::RULES, start, count).ok_or(2)?;
+        if (start, count) == (at::HEARTBEAT, 1) && !self.has(ModioFault::LocksHeartbeat) {
+            return Ok(());
+        }
         let locked = self.now >= self.open_until && (start, count) != (at::KEY, 1);
         let locked = locked && !self.has(ModioFault::NoLock);
         if locked && self.has(ModioFault::LockFirst) {
@@ -347,7 +353,7 @@ impl Modio {
         self.open_until = self.now + OPEN;
         for (address, value) in (start..).zip(words) {
             match address {
-                at::KEY => {}
+                at::KEY | at::HEARTBEAT => {}
                 at::COMMAND => self.command(*value),
                 _ => drop(self.edited.insert(address, *value)),
             }

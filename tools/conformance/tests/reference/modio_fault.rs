@@ -38,12 +38,16 @@ faults! {
     WatchdogSleeps => ["outputs/safe-when-the-line-dies"],
     /// Does not restart the communication timeout at a broadcast.
     BroadcastsAreNoLife => ["outputs/stay-while-the-line-lives"],
+    /// Does not restart the communication timeout at a write of HEARTBEAT.
+    HeartbeatsAreNoLife => ["outputs/stay-while-heartbeats-come"],
     /// Echoes writes to input points.
     EchoesInputs => ["outputs/inputs-take-no-writes"],
     /// Keeps its outputs at a loss of power.
     KeepsOutputs => ["outputs/start-value"],
     /// Accepts writes to its configuration while the lock is closed.
     NoLock => ["config/locked"],
+    /// Refuses HEARTBEAT while the lock is closed.
+    LocksHeartbeat => ["config/heartbeat"],
     /// Accepts any key.
     AnyKey => ["config/wrong-key"],
     /// Checks the lock before the value.

@@ -380,7 +380,7 @@ impl Unit {
 
     fn serve(&mut self, pdu: &[u8], broadcast: bool, at: Duration) {
         if let Some(modio) = &mut self.server.modio {
-            modio.request(at, broadcast);
+            modio.request(at, broadcast, pdu);
         }
         if self.silent_to_incomplete_writes && !is_complete(pdu) {
             return;
