@@ -8,8 +8,8 @@ use anyhow::Result;
 use fs_err as fs;
 use register_map::board::MODIO_02;
 
-use crate::build;
 use crate::command;
+use crate::test;
 use crate::workspace::{ALL, SUITE, Workspace};
 
 const PATCH: &str = "docs/adding-a-module.patch";
@@ -28,11 +28,11 @@ pub fn check(workspace: &mut Workspace) -> Result<()> {
     host.args(PACKAGES.map(|package| format!("--package={package}")));
     // Without the tests of the store, which take longest.
     command::run(host.args(["--lib", "--test=blocks"]))?;
-    let elf = build::image(&mut copy, &MODIO_02)?;
+    let images = test::images(&mut copy, &[&MODIO_02])?;
     let mut simulated = copy.cargo("test");
     simulated.args(ALL).args(["--features", SUITE]);
     simulated.args(["--test=suite", "--", "--include-ignored", TEST]);
-    command::run(simulated.env("MODIO_ELF", elf))
+    command::run(simulated.envs(images))
 }
 
 /// Returns a copy of the project with the patch. Its build uses the dependencies that are already compiled for the

@@ -22,7 +22,8 @@ pub const PROFILE: &str = "firmware";
 #[derive(clap::Args, Clone, Debug)]
 #[group(skip)]
 pub struct Options {
-    /// The board: modio-02, modio-08, fx3u-14, fx3u-24 or eth-io5r
+    /// The board
+    #[arg(help = format!("The board: {}", Board::ALL.map(|board| board.name).join(", ")))]
     #[arg(long, value_name = "NAME", default_value_t = &MODIO_02)]
     pub board: &'static Board,
 }

@@ -100,8 +100,8 @@ enum Command {
     Fuzz(fuzz::Options),
     /// Send a million frames, good and damaged, to the image in simulation
     Soak(soak::Options),
-    /// Run the conformance suite at every rate and format of the register map, in simulation, with another module for
-    /// each rate
+    /// Run the conformance suite at every rate and format of the register map, in simulation, on a board with slots with
+    /// another module for each rate
     Matrix(soak::Matrix),
     /// Renew docs/register-map.md and the list of modules in renode/commands.py
     Docs,

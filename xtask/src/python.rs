@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context as _, Result, ensure};
+use register_map::Board;
 use register_map::board::{FX3U_24, MODIO_02, MODIO_08};
 
 use crate::error::missing;
 use crate::workspace::Workspace;
-use crate::{build, command, ordinary, signed};
+use crate::{command, ordinary, test};
 
 /// The file that pins pymodbus and its serial port.
 pub const PYMODBUS: &str = "tools/sim/tests/pymodbus/requirements.txt";
@@ -64,16 +65,12 @@ pub fn python(interpreter: &Path) -> Command {
 /// others must pass.
 pub fn masters(workspace: &mut Workspace) -> Result<()> {
     let python = environment(workspace, "pymodbus", &[PYMODBUS])?;
-    let loader = build::loader(workspace, &MODIO_02)?;
-    let (_, update) = signed::update(workspace, &signed::Options::of(&MODIO_02))?;
-    let mut script = script(workspace, &python, RUN)?;
-    command::run(
-        script
-            .arg("--loader")
-            .arg(loader)
-            .arg("--update")
-            .arg(update),
-    )?;
+    command::run(&mut script(
+        workspace,
+        &python,
+        RUN,
+        &[&MODIO_02, &MODIO_08],
+    )?)?;
     ensure!(
         which::which("mbpoll").is_ok(),
         missing("passed with pymodbus, but mbpoll was not run (on Debian: apt-get install mbpoll)")
@@ -84,9 +81,6 @@ pub fn masters(workspace: &mut Workspace) -> Result<()> {
 /// Runs the tests of the simulator's page.
 pub fn page(workspace: &mut Workspace) -> Result<()> {
     let mut script = on_page(workspace, RUN)?;
-    script
-        .arg("--elf-fx3u")
-        .arg(build::image(workspace, &FX3U_24)?);
     command::run(script.arg("--tests").arg(workspace.root.join(PAGE)))
 }
 
@@ -103,11 +97,16 @@ fn on_page(workspace: &mut Workspace, name: &str) -> Result<Command> {
     );
     let playwright = format!("{PAGE}/requirements.txt");
     let python = environment(workspace, "page", &[&playwright, PYMODBUS])?;
-    script(workspace, &python, name)
+    script(workspace, &python, name, &[&MODIO_02, &MODIO_08, &FX3U_24])
 }
 
-/// Returns the call of a script that tests the images in the simulator, as an ordinary user.
-fn script(workspace: &mut Workspace, interpreter: &Path, name: &str) -> Result<Command> {
+/// Returns the call of a script that tests the loader and the images of these boards in the simulator, as an ordinary user.
+fn script(
+    workspace: &mut Workspace,
+    interpreter: &Path,
+    name: &str,
+    boards: &[&'static Board],
+) -> Result<Command> {
     let python = python(interpreter);
     let mut script = match ordinary::words()? {
         [] => python,
@@ -119,10 +118,8 @@ fn script(workspace: &mut Workspace, interpreter: &Path, name: &str) -> Result<C
         }
     };
     script.arg(workspace.root.join(name));
-    for (option, board) in [("--elf", &MODIO_02), ("--elf-08", &MODIO_08)] {
-        script.arg(option).arg(build::image(workspace, board)?);
-    }
-    script.arg("--sim").arg(workspace.simulator()?);
+    script.envs(test::images(workspace, boards)?);
+    script.env("MODIO_SIM", workspace.simulator()?);
     script.current_dir(&workspace.root);
     Ok(script)
 }

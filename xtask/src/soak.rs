@@ -3,11 +3,13 @@
 
 use std::time::SystemTime;
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use register_map::Module;
+use register_map::board::MODIO_02;
 
-use crate::test;
+use crate::error::usage;
 use crate::workspace::Workspace;
+use crate::{build, test};
 
 /// The options of a test run with one test, which shows its progress.
 const ONE_TEST: &str = "--nocapture --exact";
@@ -45,16 +47,25 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
         (variable, &*length.to_string()),
         (test::CORNER, &options.corner),
     ];
-    test::simulated(workspace, "--quiet --test=image", &name, &variables)
+    test::simulated(
+        workspace,
+        &[&MODIO_02],
+        "--quiet --test=image",
+        &name,
+        &variables,
+    )
 }
 
 /// Number of turns after which each rate has had every module.
 const MODULES: u64 = Module::ALL.len() as u64;
 
-/// Which module each rate of the matrix has.
+/// The board of the matrix, and which module each rate has.
 #[derive(clap::Args, Clone, Debug)]
 #[group(skip)]
 pub struct Matrix {
+    #[command(flatten)]
+    build: build::Options,
+
     /// Move the modules on by so many rates, to repeat a run [default: the number of the day, so that each rate has
     /// every module once in as many days as there are modules]
     #[arg(long, value_parser = clap::value_parser!(u64).range(..MODULES))]
@@ -62,13 +73,27 @@ pub struct Matrix {
 }
 
 /// `cargo xtask matrix`: every case of the conformance suite at every rate and format of the register map, with another
-/// module for each rate, the test `matrix` of `tools/conformance/tests/suite`.
+/// module for each rate on a board with slots, the test `matrix` of `tools/conformance/tests/suite`.
 pub fn matrix(workspace: &mut Workspace, options: &Matrix) -> Result<()> {
     const DAY_S: u64 = 24 * 60 * 60;
+    let board = options.build.board;
+    let has_slots = board.fixed.is_empty();
+    ensure!(
+        has_slots || options.turn.is_none(),
+        usage(format!("the {board} has no slots: leave out --turn"))
+    );
     let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH)?;
     let turn = options.turn.unwrap_or(since.as_secs() / DAY_S % MODULES);
-    say!("repeat this run with: cargo xtask matrix --turn {turn}");
+    if has_slots {
+        say!("repeat this run with: cargo xtask matrix --board {board} --turn {turn}");
+    }
     let name = format!("{ONE_TEST} matrix::every_rate_and_format_conforms");
-    let every_case = [("MODIO_MATRIX", &*turn.to_string())];
-    test::simulated(workspace, "--quiet --test=suite", &name, &every_case)
+    let every_case = [("MODIO_MATRIX", &*format!("{board} {turn}"))];
+    test::simulated(
+        workspace,
+        &[board],
+        "--quiet --test=suite",
+        &name,
+        &every_case,
+    )
 }

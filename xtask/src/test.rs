@@ -10,7 +10,7 @@ use In::{Ci, Host, Test};
 use Run::{Each, EachOfModio, Once};
 use anyhow::{Result, bail, ensure};
 use register_map::Board;
-use register_map::board::{ETH_IO5R, FX3U_24, MODIO_02, MODIO_08};
+use register_map::board::{FX3U_24, MODIO_02, MODIO_08};
 
 use crate::error::{missing, usage};
 use crate::python::{masters, page};
@@ -295,19 +295,23 @@ fn image(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
 
 fn sim(workspace: &mut Workspace) -> Result<()> {
     let tests = "--bin=modio-sim --test=command --test=image --test=image_08 --test=image_fx3u";
-    simulated(workspace, tests, "", &[])
+    // The image that runs alone, which is beside the others.
+    build::image(workspace, &MODIO_02)?;
+    let boards = [&MODIO_02, &MODIO_08, &FX3U_24];
+    simulated(workspace, &boards, tests, "", &[])
 }
 
 fn suite(workspace: &mut Workspace) -> Result<()> {
     let tests = "--test=suite --test=hil --test=hil_simulator";
-    simulated(workspace, tests, "", &[])
+    simulated(workspace, &Board::ALL, tests, "", &[])
 }
 
 fn tool(workspace: &mut Workspace) -> Result<()> {
     // The simulators follow the wall clock, so the tests mostly wait.
     let threads = thread::available_parallelism().map_or(2, |cores| cores.get() + 1);
     let threads = format!("--test-threads={threads}");
-    simulated(workspace, "--test=simulator", &threads, &[])?;
+    let boards = [&MODIO_02, &MODIO_08];
+    simulated(workspace, &boards, "--test=simulator", &threads, &[])?;
     ensure!(
         which::which("node").is_ok(),
         missing(
@@ -329,53 +333,44 @@ fn sim_fast(workspace: &mut Workspace) -> Result<()> {
 
 fn sim_at(workspace: &mut Workspace, corner: &str) -> Result<()> {
     let corner = [(CORNER, corner)];
-    simulated(workspace, "--test=image", AT_CORNERS, &corner)?;
-    simulated(workspace, "--test=image_08", AT_CORNERS_08, &corner)?;
-    simulated(workspace, "--test=image_fx3u", "", &corner)
+    for (board, test, names) in [
+        (&MODIO_02, "--test=image", AT_CORNERS),
+        (&MODIO_08, "--test=image_08", AT_CORNERS_08),
+        (&FX3U_24, "--test=image_fx3u", ""),
+    ] {
+        simulated(workspace, &[board], test, names, &corner)?;
+    }
+    Ok(())
 }
 
-/// Builds the loader of a board, the signed images for slots A and B, and the file of an update, and returns their paths.
-fn loaded(workspace: &mut Workspace, board: &'static Board) -> Result<[PathBuf; 4]> {
-    let loader = build::loader(workspace, board)?;
-    let ([a, b], update) = signed::update(workspace, &signed::Options::of(board))?;
-    Ok([loader, a, b, update])
+/// Builds the loader of these boards, and the signed images for both slots. Returns for each board the variable with which
+/// tests find the directory of these files.
+pub fn images(
+    workspace: &mut Workspace,
+    boards: &[&'static Board],
+) -> Result<Vec<(String, PathBuf)>> {
+    let mut directories = Vec::new();
+    for board in boards {
+        let loader = build::loader(workspace, board)?;
+        signed::update(workspace, &signed::Options::of(board))?;
+        let name = board.name.to_uppercase().replace('-', "_");
+        directories.push((format!("MODIO_IMAGES_{name}"), loader.with_file_name("")));
+    }
+    Ok(directories)
 }
 
-/// Runs tests that run the images in the simulator, as an ordinary user: those of these targets whose names contain one
-/// of `names`, or all. Spaces separate targets and names. A name that begins with `--` is an option of the tests. The
+/// Runs tests that run the loader and the images of these boards in the simulator, as an ordinary user: those of these
+/// targets whose names contain one of `names`, or all. Spaces separate targets and names. A name that begins with `--` is an option of the tests. The
 /// variables choose the corner of the part, and how long a test is.
 pub fn simulated(
     workspace: &mut Workspace,
+    boards: &[&'static Board],
     targets: &str,
     names: &str,
     variables: &[(&str, &str)],
 ) -> Result<()> {
     let ordinary = ordinary::words()?;
-    let mut files = Vec::new();
-    let runs = |of: &str| targets.split(' ').any(|target| target == of);
-    if runs("--test=image") || runs("--test=simulator") {
-        let names = ["MODIO_LOADER", "MODIO_A", "MODIO_B", "MODIO_UPDATE"];
-        files.extend(names.into_iter().zip(loaded(workspace, &MODIO_02)?));
-    }
-    if runs("--test=image_08") {
-        let names = [
-            "MODIO_LOADER_08",
-            "MODIO_A_08",
-            "MODIO_B_08",
-            "MODIO_UPDATE_08",
-        ];
-        files.extend(names.into_iter().zip(loaded(workspace, &MODIO_08)?));
-    }
-    if runs("--test=image_fx3u") {
-        let [loader, a, ..] = loaded(workspace, &FX3U_24)?;
-        files.extend([("MODIO_LOADER_FX3U", loader), ("MODIO_A_FX3U", a)]);
-    }
-    if runs("--test=suite") {
-        files.push(("MODIO_ELF_IO5R", build::image(workspace, &ETH_IO5R)?));
-    }
-    files.push(("MODIO_ELF_FX3U", build::image(workspace, &FX3U_24)?));
-    files.push(("MODIO_ELF", build::image(workspace, &MODIO_02)?));
-    files.push(("MODIO_ELF_08", build::image(workspace, &MODIO_08)?));
+    let images = images(workspace, boards)?;
     let simulator = workspace.simulator()?;
     let tests = |list: &[&str]| {
         let mut cargo = workspace.cargo("test");
@@ -388,7 +383,7 @@ pub fn simulated(
         cargo.args(["--", "--ignored"]).args(list);
         cargo.args(names.split_whitespace());
         cargo.env(CORNER, "nominal").envs(variables.iter().copied());
-        cargo.envs(files.iter().map(|(name, file)| (name, file)));
+        cargo.envs(images.iter().map(|(name, directory)| (name, directory)));
         // Tests of one package do not know the path of another package's program.
         cargo.env("MODIO_SIM", &simulator);
         cargo
@@ -466,6 +461,18 @@ mod tests {
         include_str!("../../.github/workflows/ci.yml"),
         include_str!("../../.github/workflows/nightly.yml"),
     ];
+
+    #[test]
+    fn matrix_of_every_board_runs_at_night() {
+        let [_, nightly] = WORKFLOWS;
+        for board in Board::ALL {
+            let run = format!("run: cargo xtask matrix --board {board}\n");
+            assert!(
+                nightly.contains(&run),
+                "{board} is in no job of nightly.yml"
+            );
+        }
+    }
 
     #[test]
     fn workflows_name_every_action_by_its_commit_and_every_artifact_by_its_name() {

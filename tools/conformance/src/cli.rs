@@ -36,13 +36,20 @@ pub struct Cli {
     #[arg(long, value_name = "HOST:PORT", group = "endpoint", conflicts_with_all = ["baud", "format"])]
     pub exact_line: Option<String>,
 
-    /// Test this firmware image in the simulator, in exact virtual time
+    /// Test the firmware in the simulator, in exact virtual time: the loader with the image of --image, or without it an
+    /// image that runs alone
     #[cfg(feature = "sim")]
     #[arg(long, value_name = "ELF", group = "endpoint")]
     pub sim: Option<PathBuf>,
 
-    /// The simulated board: modio-02 or modio-08. The image must be for this board
+    /// The image that the loader of --sim starts: the file of an update (.modio), or of one slot (.image)
     #[cfg(feature = "sim")]
+    #[arg(long, value_name = "FILE", requires = "sim")]
+    pub image: Option<PathBuf>,
+
+    /// The simulated board, which the image must be for
+    #[cfg(feature = "sim")]
+    #[arg(help = format!("The simulated board, which the image must be for: {}", register_map::Board::ALL.map(|board| board.name).join(", ")))]
     #[arg(long, value_name = "NAME", default_value_t = &register_map::board::MODIO_02, conflicts_with_all = ["serial", "tcp", "exact_line"])]
     pub board: &'static register_map::Board,
 
@@ -189,6 +196,7 @@ impl Cli {
             use crate::endpoint::sim::{Fitting, start};
             return Ok(Box::new(start(&Fitting {
                 elf: elf.clone(),
+                image: self.image.clone(),
                 board: self.board,
                 module: self.module,
                 slots: self.slots.clone(),

@@ -19,13 +19,14 @@ use register_map::board::MODIO_02;
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn image_loses_no_frame_at_any_rate_and_its_rate_is_restored() {
-    let elf = env::var_os("MODIO_ELF").expect("MODIO_ELF names the image: cargo xtask test");
+    let images = env::var_os("MODIO_IMAGES_MODIO_02").expect("cargo xtask test sets it");
+    let [loader, image] = ["loader", "modio-a.image"].map(|name| PathBuf::from(&images).join(name));
     let home = LineFormat::default();
     let mut endpoint = start(&Fitting {
         module: Module::Do4,
         dip: 3,
         line: home,
-        ..Fitting::new(PathBuf::from(elf), &MODIO_02)
+        ..Fitting::new(loader, image, &MODIO_02)
     })
     .expect("the image can be read");
     let rates = vec![9600, 19_200, 115_200, 921_600];
@@ -67,7 +68,7 @@ fn image_loses_no_frame_at_any_rate_and_its_rate_is_restored() {
     endpoint.set_power(false).expect("a simulator switches");
     endpoint.set_power(true).expect("a simulator switches");
     endpoint
-        .rest(Duration::from_millis(150))
+        .rest(Duration::from_millis(200))
         .expect("time passes");
     let again = Plan {
         cases: Vec::new(),

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use modbus_line::LineFormat;
 use modbus_line::exact::{Reply, Request};
 use register_map::{Module, configuration};
-use sim::board::Layout;
+use sim::board::{Firmware, InSlot, Layout};
 use sim::exact_line::Session;
 use sim::{Board, Config, Image, Time};
 
@@ -14,14 +14,16 @@ use super::exact_line::{ExactLine, Transport};
 use crate::frame::Mode;
 use crate::target::codes;
 
-/// Time that the unit has to start after power-on.
-const START: Time = Time::from_ms(150);
+/// Time that the unit has to start after power-on: at most 70 ms in the loader, and 100 ms in the application.
+const START: Time = Time::from_ms(200);
 
 /// How the virtual board is fitted and set.
 #[derive(Clone, Debug)]
 pub struct Fitting {
-    /// The firmware's ELF file.
+    /// An ELF file: the loader, or an application that runs alone.
     pub elf: PathBuf,
+    /// The file with the image that the loader starts; `None` for an application that runs alone.
+    pub image: Option<PathBuf>,
     /// The board.
     pub board: &'static register_map::Board,
     /// The module in the first slot, unless `slots` names that slot.
@@ -39,10 +41,11 @@ pub struct Fitting {
 }
 
 impl Fitting {
-    /// Returns a board with this image and empty slots, set as in the factory: address 1, 9600 8N2, RTU.
-    pub fn new(elf: PathBuf, board: &'static register_map::Board) -> Self {
+    /// Returns a board with this loader, this image and empty slots, set as in the factory: address 1, 9600 8N2, RTU.
+    pub fn new(loader: PathBuf, image: PathBuf, board: &'static register_map::Board) -> Self {
         Self {
-            elf,
+            elf: loader,
+            image: Some(image),
             board,
             module: Module::None,
             slots: Vec::new(),
@@ -62,7 +65,7 @@ pub struct InProcess {
 
 /// Starts a board fitted like this. Returns the master's end of its line.
 pub fn start(fitting: &Fitting) -> Result<ExactLine<InProcess>, Broken> {
-    let image = Image::read(&fitting.elf).map_err(|e| Broken(e.to_string()))?;
+    let elf = Image::read(&fitting.elf).map_err(|e| Broken(e.to_string()))?;
     let unknown = || Broken(format!("the simulator does not know the {}", fitting.board));
     let mut config = Config {
         layout: Layout::of(fitting.board).ok_or_else(unknown)?,
@@ -71,7 +74,22 @@ pub fn start(fitting: &Fitting) -> Result<ExactLine<InProcess>, Broken> {
         slots: fitting.slots.clone(),
         ..Config::default()
     };
-    config.chip.flash = Some(flash(fitting, &config)?);
+    let firmware = match &fitting.image {
+        Some(image) => Firmware::Loaded(elf, InSlot::read(config.layout, image).map_err(Broken)?),
+        None => Firmware::Alone(elf),
+    };
+    let mut flash = vec![0xFF; config.layout.part.flash_size];
+    let programmed = firmware.program(config.layout, &mut flash, false);
+    let (image, _) = programmed.map_err(|e| Broken(e.to_string()))?;
+    if !config
+        .layout
+        .store(&mut flash, &settings(fitting, &config)?)
+    {
+        return Err(Broken(
+            "too many settings for a page of the store".to_owned(),
+        ));
+    }
+    config.chip.flash = Some(flash);
     let mut board = Board::new(&image, config).map_err(|e| Broken(e.to_string()))?;
     board.run_for(START);
     let mut server = InProcess {
@@ -89,8 +107,8 @@ impl Transport for InProcess {
     }
 }
 
-/// Returns the contents of a flash in which these settings are stored.
-fn flash(fitting: &Fitting, config: &Config) -> Result<Vec<u8>, Broken> {
+/// Returns the stored settings: register and value.
+fn settings(fitting: &Fitting, config: &Config) -> Result<Vec<(u16, u16)>, Broken> {
     let mut pairs: Vec<_> = configuration::modules(config.plugged()).collect();
     let codes = codes(fitting.line).map_err(Broken)?;
     pairs.extend(
@@ -102,6 +120,5 @@ fn flash(fitting: &Fitting, config: &Config) -> Result<Vec<u8>, Broken> {
         pairs.push((configuration::MODE, 1));
     }
     pairs.extend(&fitting.settings);
-    let flash = config.layout.flash_with(&pairs);
-    flash.ok_or_else(|| Broken("too many settings for a page of the store".to_owned()))
+    Ok(pairs)
 }

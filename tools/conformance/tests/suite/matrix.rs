@@ -1,8 +1,8 @@
-//! Tests the image at every rate and format of the register map, in RTU and in ASCII mode.
+//! Tests a board at every rate and format of the register map, in RTU and in ASCII mode.
 //!
 //! `cargo xtask matrix` sets `MODIO_MATRIX` and runs every case in each cell. Every other test run includes the cases that
-//! depend on rate or format, in every third cell: each rate with other formats than the rates beside it. Each rate has
-//! another module in the slot.
+//! depend on rate or format, on the modio-02 and in every third cell: each rate with other formats than the rates beside
+//! it. On a board with slots each rate has other modules in them.
 
 use std::env;
 
@@ -11,13 +11,15 @@ use conformance::cases::all;
 use conformance::endpoint::sim::Fitting;
 use conformance::frame::Mode;
 use modbus_line::LineFormat;
-use rayon::iter::{IndexedParallelIterator as _, IntoParallelIterator as _, ParallelIterator as _};
-use register_map::Module;
+use rayon::iter::{
+    IndexedParallelIterator as _, IntoParallelRefIterator as _, ParallelIterator as _,
+};
 use register_map::codes::{self, Baud, Format};
+use register_map::{Board, Module};
 
-use super::{failed, in_process, line, modio_02, passed};
+use super::{failed, in_process, line, of, passed};
 
-/// Set to run every case. Its number moves the modules on by so many rates.
+/// Set to run every case: the name of the board, and a number that moves the modules on by so many rates.
 const VARIABLE: &str = "MODIO_MATRIX";
 
 /// Parts of the names of cases that depend on rate or format.
@@ -34,7 +36,7 @@ const CHOSEN: [&str; 8] = [
 
 /// Parts of the names of the cases that take longest: they damage each character of a frame in turn, wait for a second
 /// each time, or send hundreds of random frames.
-const LONG: [&str; 7] = [
+pub const LONG: [&str; 7] = [
     "ascii/truncated",
     "ascii/damaged",
     "ascii/gap",
@@ -44,23 +46,26 @@ const LONG: [&str; 7] = [
     "hurts/torn-values",
 ];
 
-/// A rate, a format and a mode that can be used together, with the module of the rate.
-type Cell = (LineFormat, Mode, Module);
-
-fn cells(turn: usize) -> Vec<Cell> {
+/// Returns the board at each rate, format and mode that can be used together.
+fn cells(board: &'static Board, turn: usize) -> Vec<Fitting> {
     let mut cells = Vec::new();
-    for (baud, module) in Baud::ALL
-        .iter()
-        .zip(Module::ALL.into_iter().cycle().skip(turn))
-    {
+    for (baud, n) in Baud::ALL.iter().zip(turn..) {
+        // The modules of a board with several slots differ, and each slot has every module in turn.
+        let modules = Module::ALL.into_iter().cycle().skip(n);
+        let ports = board.ports().filter(|_| board.fixed.is_empty());
+        let slots: Vec<(u8, Module)> = ports.map(|port| port as u8).zip(modules).collect();
         for (format, (_, name)) in Format::ALL.iter().zip(Format::NAMES) {
-            let line = line(baud.bits_per_second(), name);
             for (mode, of_map) in [
                 (Mode::Rtu, codes::Mode::Rtu),
                 (Mode::Ascii, codes::Mode::Ascii),
             ] {
                 if format.suits(of_map) {
-                    cells.push((line, mode, module));
+                    cells.push(Fitting {
+                        line: line(baud.bits_per_second(), name),
+                        mode,
+                        slots: slots.clone(),
+                        ..of(board)
+                    });
                 }
             }
         }
@@ -69,7 +74,7 @@ fn cells(turn: usize) -> Vec<Cell> {
 }
 
 /// The cases to run. The tours of all rates and formats run only at one rate and format.
-fn cases(every: bool, (line, ..): Cell) -> Vec<Case> {
+fn cases(every: bool, line: LineFormat) -> Vec<Case> {
     let mut cases = all();
     let named = |case: &Case, parts: &[&str]| parts.iter().any(|part| case.name.contains(part));
     if !every {
@@ -81,33 +86,35 @@ fn cases(every: bool, (line, ..): Cell) -> Vec<Case> {
 }
 
 /// Runs the cases of a cell. Returns a row for each case that failed.
-fn failures(cell: Cell, every: bool) -> Vec<String> {
-    let (line, mode, module) = cell;
-    let fitting = Fitting {
-        line,
-        mode,
-        ..modio_02(module)
-    };
-    let outcomes = in_process(&fitting, &cases(every, cell));
+fn failures(cell: &Fitting, every: bool) -> Vec<String> {
+    let outcomes = in_process(cell, &cases(every, cell.line));
     let passed = passed(&outcomes);
-    println!("{line} {mode:?} {module}: {passed} passed");
+    let slots: String = cell
+        .slots
+        .iter()
+        .map(|(port, module)| format!(" {port}={module}"))
+        .collect();
+    let name = format!("{} {} {:?}{slots}", cell.board, cell.line, cell.mode);
+    println!("{name}: {passed} passed");
     let least = if every { 140 } else { 12 };
-    assert!(passed > least, "{cell:?}: only {passed} cases passed");
+    assert!(passed > least, "{name}: only {passed} cases passed");
     let rows = failed(&outcomes).into_iter();
-    rows.map(|row| format!("{line} {mode:?} {module}: {row}"))
-        .collect()
+    rows.map(|row| format!("{name}: {row}")).collect()
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn every_rate_and_format_conforms() {
-    let turn = env::var(VARIABLE).ok();
-    let every = turn.is_some();
-    let cells = cells(turn.map_or(0, |turn| turn.parse().expect("a number")));
+    let every_case = env::var(VARIABLE).ok();
+    let chosen = every_case.as_deref().unwrap_or("modio-02 0");
+    let (board, turn) = chosen.split_once(' ').expect("a board and a number");
+    let board = board.parse().expect("a board");
+    let cells = cells(board, turn.parse().expect("a number"));
     assert_eq!(cells.len(), Baud::ALL.len() * (4 + 7));
+    let every = every_case.is_some();
     let step = if every { 1 } else { 3 };
     let failed: Vec<String> = cells
-        .into_par_iter()
+        .par_iter()
         .step_by(step)
         .flat_map_iter(|cell| failures(cell, every))
         .collect();

@@ -72,9 +72,11 @@ impl Drop for Simulator {
 impl Simulator {
     /// Starts boards with these addresses and modules, and their line at `port`.
     fn start(port: &Path, units: &[(u8, &str)]) -> Self {
-        let variable = |name| env::var_os(name).expect("MODIO_ELF and MODIO_SIM: cargo xtask test");
+        let variable = |name| PathBuf::from(env::var_os(name).expect("cargo xtask test sets it"));
+        let images = variable("MODIO_IMAGES_MODIO_02");
         let mut command = Command::new(variable("MODIO_SIM"));
-        command.arg("--elf").arg(variable("MODIO_ELF"));
+        command.arg("--loader").arg(images.join("loader"));
+        command.arg("--image").arg(images.join("modio-a.image"));
         command.arg("--pty").arg(port);
         command.args(["--http", "127.0.0.1:0"]);
         for (unit, module) in units {

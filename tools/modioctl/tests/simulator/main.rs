@@ -1,6 +1,6 @@
-//! Tests of `modioctl` as a program: with units that the tests serve themselves, and with the release image in the
+//! Tests of `modioctl` as a program: with units that the tests serve themselves, and with loader and release image in the
 //! simulator, over a pseudo-terminal, over TCP and over Modbus TCP. The latter are ignored unless `cargo xtask test` runs
-//! them, which passes the paths of simulator and image in MODIO_SIM and MODIO_ELF.
+//! them, which passes the path of the simulator in MODIO_SIM, and the directories of the images.
 
 #![cfg(unix)]
 

@@ -21,9 +21,14 @@ fn path(variable: &str) -> PathBuf {
         .into()
 }
 
+/// Returns a file of the modio-02's firmware.
+fn file(name: &str) -> PathBuf {
+    path("MODIO_IMAGES_MODIO_02").join(name)
+}
+
 /// Returns the path of the file of an update.
 pub fn update_file() -> PathBuf {
-    path("MODIO_UPDATE")
+    file("modio-02.modio")
 }
 
 impl Unit {
@@ -47,31 +52,17 @@ impl Unit {
     pub fn bus(boards: &str) -> Self {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), boards).unwrap();
-        let elf_08 = format!("modio-08={}", path("MODIO_ELF_08").display());
-        let files = [
-            ("--elf", path("MODIO_ELF")),
-            ("--elf", elf_08.into()),
-            ("--bus", file.path().to_owned()),
-        ];
-        Self::start_with(&files, &[])
-    }
-
-    /// Starts a modio-02 with address 1, which has a loader and runs the image of the [`update_file`] for slot A.
-    pub fn with_loader() -> Self {
-        let (loader, image) = (path("MODIO_LOADER"), update_file());
-        let files = [("--loader", loader), ("--image", image)];
-        Self::start_with(&files, &["--module", "4di"])
+        let images = path("MODIO_IMAGES_MODIO_08");
+        let of_08 = |name| format!("modio-08={}", images.join(name).display());
+        let (loader, image) = (of_08("loader"), of_08("modio-08.modio"));
+        let boards = file.path().to_str().unwrap();
+        Self::run(&["--loader", &loader, "--image", &image, "--bus", boards])
     }
 
     fn run(options: &[&str]) -> Self {
-        Self::start_with(&[("--elf", path("MODIO_ELF"))], options)
-    }
-
-    fn start_with(files: &[(&str, PathBuf)], options: &[&str]) -> Self {
         let mut simulator = Command::new(path("MODIO_SIM"));
-        for (option, file) in files {
-            simulator.arg(option).arg(file);
-        }
+        simulator.arg("--loader").arg(file("loader"));
+        simulator.arg("--image").arg(update_file());
         let mut simulator = simulator
             .args(["--tcp", "127.0.0.1:0", "--http", "127.0.0.1:0"])
             .args(options)

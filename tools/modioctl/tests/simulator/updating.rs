@@ -279,7 +279,7 @@ fn status_shows_both_slots_and_the_way_back_exchanges_them() {
 #[test]
 #[ignore = "needs the simulator: cargo xtask test"]
 fn a_unit_takes_the_image_for_its_other_slot_and_goes_back() {
-    let unit = Unit::with_loader();
+    let unit = Unit::with(1, &["--module", "4di"]);
     let at = At::port(unit.pty.display());
     at.run("config set BAUD=115200").fine();
     at.run("config save").fine();

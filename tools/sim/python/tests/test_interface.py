@@ -2,7 +2,6 @@
 
 import ast
 import inspect
-import os
 import pathlib
 import re
 import typing
@@ -10,9 +9,10 @@ import unittest
 
 import modio_sim
 from modio_sim.connection import Http
+from simulator import firmware
 
 HERE = pathlib.Path(__file__).resolve().parent
-with modio_sim.Simulator.start(elf=os.environ["MODIO_ELF"]) as running:
+with modio_sim.Simulator.start(options=firmware()) as running:
     DESCRIPTION = running.openapi()
 
 CHANNELS = [{"kind": "none"}] * 4

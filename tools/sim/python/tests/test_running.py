@@ -9,11 +9,12 @@ import time
 import unittest
 
 import modio_sim
+from simulator import firmware
 
 
 def started(**options):
-    """Starts a simulator with the image of the tests."""
-    return modio_sim.Simulator.start(elf=os.environ["MODIO_ELF"], **options)
+    """Starts a simulator with the loader and the image of the tests."""
+    return modio_sim.Simulator.start(**options | {"options": [*firmware(), *options.get("options", ())]})
 
 
 # Reads the four points of the slot of unit 1.
@@ -183,10 +184,11 @@ class Start(unittest.TestCase):
             modio_sim.Simulator.attach(f"http://127.0.0.1:{port}")
         self.assertIn(str(port), str(missing.exception))
 
-    @unittest.skipUnless("MODIO_ELF_08" in os.environ, "needs the image of the modio-08 in MODIO_ELF_08")
+    @unittest.skipUnless("MODIO_IMAGES_MODIO_08" in os.environ, "needs the images of the modio-08")
     def test_slots_are_addressed_by_their_ports(self):
         slots = {1: "4di", 3: "4ai"}
-        with modio_sim.Simulator.start(elf=os.environ["MODIO_ELF_08"], board="modio-08", slots=slots) as simulator:
+        options = firmware("modio-08")
+        with modio_sim.Simulator.start(options=options, board="modio-08", slots=slots) as simulator:
             state = simulator.set_channel(2, millivolts=1650, port=3)
             self.assertEqual([slot.port for slot in state.slots], [1, 2, 3, 4])
             self.assertEqual(state.slot(3).channels[1].millivolts, 1650)

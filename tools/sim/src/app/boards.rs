@@ -1,7 +1,6 @@
 //! Makes the boards that the options name, each with its image, flash and modules.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::Path;
 
 use register_map::{codes::Lora, configuration};
@@ -64,13 +63,12 @@ fn firmware(layout: &Layout, options: &Options) -> Result<Firmware, String> {
     Ok(match options.files_of(board)? {
         Files::Alone(path) => Firmware::Alone(elf(path, ".elf")?),
         Files::Loaded { loader, image } => {
-            let (file, name) = match image {
-                Some(path) => (fs::read(path), path.display().to_string()),
-                None => (Ok(inside(".modio")?), "inside".to_owned()),
+            let image = match image {
+                Some(path) => InSlot::read(layout, path),
+                None => InSlot::from_file(layout, &inside(".modio")?)
+                    .map_err(|what| format!("inside: {what}")),
             };
-            let image = file.map_err(|error| error.to_string());
-            let image = image.and_then(|file| InSlot::from_file(layout, &file));
-            let image = image.map_err(|what| format!("cannot run the image {name}: {what}"))?;
+            let image = image.map_err(|what| format!("cannot run the image {what}"))?;
             Firmware::Loaded(elf(loader, "-loader.elf")?, image)
         }
     })

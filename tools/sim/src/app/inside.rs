@@ -65,8 +65,8 @@ mod tests {
     #[test]
     #[ignore = "needs the image: cargo xtask test"]
     fn an_image_reports_its_version() {
-        let path = std::env::var_os("MODIO_ELF").expect("MODIO_ELF names the image");
-        let elf = std::fs::read(path).unwrap();
+        let images = std::env::var("MODIO_IMAGES_MODIO_02").expect("cargo xtask test sets it");
+        let elf = std::fs::read(format!("{images}/modio")).unwrap();
         let layout = Layout::of(&register_map::board::MODIO_02).unwrap();
         let version = firmware(layout, &elf).unwrap();
         assert_eq!(version, env!("CARGO_PKG_VERSION"));

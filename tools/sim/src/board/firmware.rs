@@ -4,6 +4,7 @@
 //! boot state is written together with the image, as if the board had been started once.
 
 use std::ops::Range;
+use std::path::Path;
 
 use f103::Image;
 use f103::memory::FLASH_BASE;
@@ -36,6 +37,17 @@ pub struct InSlot {
 }
 
 impl InSlot {
+    /// Reads a file, and returns the image that [`from_file`](Self::from_file) finds in it.
+    ///
+    /// # Errors
+    ///
+    /// In one line: the file cannot be read, or has no image for the board.
+    pub fn read(layout: &Layout, path: &Path) -> Result<Self, String> {
+        let file = std::fs::read(path).map_err(|error| error.to_string());
+        let image = file.and_then(|file| Self::from_file(layout, &file));
+        image.map_err(|what| format!("{}: {what}", path.display()))
+    }
+
     /// Returns the image in the file of an update (the one for slot A), or in a file for one slot.
     ///
     /// # Errors

@@ -197,8 +197,7 @@ fn halted_core_is_exception_0a_until_the_debugger_leaves() {
 
 /// Returns a simulator that runs the image.
 fn image(more: &[&str]) -> (Running, String, String) {
-    let image = std::env::var("MODIO_ELF").expect("MODIO_ELF names the image");
-    ready(Running::start_image(&image, &[&GATEWAY[..], more].concat()))
+    ready(Running::start_firmware(&[&GATEWAY[..], more].concat()))
 }
 
 fn write(address: u16, value: u16) -> Vec<u8> {

@@ -104,6 +104,21 @@ impl Running {
         Self::start(&[&first[..], more].concat())
     }
 
+    /// Starts a simulator with the loader and the image of the modio-02, with HTTP on a free port.
+    pub fn start_firmware(more: &[&str]) -> Self {
+        let images = std::env::var("MODIO_IMAGES_MODIO_02").expect("cargo xtask test sets it");
+        let [loader, image] = ["loader", "modio-a.image"].map(|name| format!("{images}/{name}"));
+        let first = [
+            "--loader",
+            &loader,
+            "--image",
+            &image,
+            "--http",
+            "127.0.0.1:0",
+        ];
+        Self::start(&[&first[..], more].concat())
+    }
+
     /// Starts a simulator whose firmware is an endless loop, with HTTP on a free port.
     pub fn start_loop(more: &[&str]) -> Self {
         let directory = tempfile::tempdir().unwrap();

@@ -28,9 +28,7 @@ pub struct Unit {
 
 impl Unit {
     pub fn start(more: &[&str]) -> Self {
-        let image = std::env::var("MODIO_ELF").expect("MODIO_ELF names the image");
-        let mut running =
-            Running::start_image(&image, &[&["--tcp", "127.0.0.1:0"][..], more].concat());
+        let mut running = Running::start_firmware(&[&["--tcp", "127.0.0.1:0"][..], more].concat());
         running.skip_pty();
         let line = TcpStream::connect(running.endpoint("tcp: ")).unwrap();
         line.set_read_timeout(Some(Duration::from_secs(5))).unwrap();

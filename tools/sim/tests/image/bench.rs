@@ -1,15 +1,16 @@
 //! A board that runs the image, and a master on its line.
 
-use std::{env, ops::Range, path::PathBuf, sync::OnceLock};
+use std::{env, ops::Range, path::PathBuf, sync::LazyLock};
 
 use register_map::{configuration, points};
 use sim::{
     Board, Config, Corner, Finding, Image, Module, Time,
+    board::{Firmware, InSlot},
     finding::What,
     line::{Format, Settings, frame_silence},
 };
 
-use crate::{ELF, LAYOUT};
+use crate::LAYOUT;
 
 /// The port of the board's first slot.
 pub const PORT: u16 = LAYOUT.board.first_port;
@@ -21,9 +22,9 @@ pub const FIRST: u8 = SLOT as u8;
 pub const MODULE: u16 = configuration::MODULE + PORT - 1;
 
 /// Size of a page of the store in bytes.
-pub const PAGE_SIZE: usize = LAYOUT.board.store.bytes as usize;
+pub const PAGE_SIZE: usize = LAYOUT.board.layout().store.bytes as usize;
 /// Addresses of the store's pages.
-pub const PAGE_ADDRESSES: [u32; 2] = LAYOUT.board.store.addresses();
+pub const PAGE_ADDRESSES: [u32; 2] = LAYOUT.board.layout().store.addresses();
 
 /// Returns the offsets of the store's pages in the flash.
 pub fn pages() -> [Range<usize>; 2] {
@@ -35,24 +36,59 @@ pub fn pages() -> [Range<usize>; 2] {
 
 const FLASH_START: u32 = 0x0800_0000;
 
-/// Returns the image under test.
-pub fn image() -> &'static Image {
-    static IMAGE: OnceLock<Image> = OnceLock::new();
-    IMAGE.get_or_init(|| Image::read(&path(ELF)).expect("the image can be read"))
+/// The firmware under test: the loader, and the image for slot A.
+static FIRMWARE: LazyLock<Firmware> = LazyLock::new(|| {
+    let loader = Image::read(&file("loader")).expect("the loader can be read");
+    let image = InSlot::read(LAYOUT, &file("modio-a.image")).expect("the image can be read");
+    Firmware::Loaded(loader, image)
+});
+
+/// Returns a file of the board's firmware.
+pub fn file(name: &str) -> PathBuf {
+    let board = LAYOUT.board.name.to_uppercase().replace('-', "_");
+    let variable = format!("MODIO_IMAGES_{board}");
+    let directory = env::var_os(&variable);
+    let directory = directory.unwrap_or_else(|| panic!("{variable}: cargo xtask test sets it"));
+    PathBuf::from(directory).join(name)
 }
 
-/// Returns the path that a variable names.
-pub fn path(variable: &str) -> PathBuf {
-    let path = env::var_os(variable);
-    path.unwrap_or_else(|| panic!("{variable}: cargo xtask test sets it"))
-        .into()
+/// Returns the address of a symbol of the application.
+pub fn symbol(name: &str) -> u32 {
+    static APPLICATION: LazyLock<Image> =
+        LazyLock::new(|| Image::read(&file("modio-a")).expect("the application can be read"));
+    let symbol = APPLICATION.symbol(name);
+    symbol.unwrap_or_else(|| panic!("the application has no symbol {name}"))
 }
 
-/// Returns a flash whose stored configuration has these settings: address and value.
+/// Returns a flash with the firmware under test, as after its first start, and a stored configuration with these
+/// settings: address and value.
 pub fn flash_with_settings(pairs: &[(u16, u16)]) -> Vec<u8> {
-    LAYOUT
-        .flash_with(pairs)
-        .expect("the settings fit in the store")
+    let mut flash = programmed();
+    let fit = LAYOUT.store(&mut flash, pairs);
+    assert!(fit, "the settings fit in the store");
+    flash
+}
+
+/// Returns a flash with the firmware under test, as after its first start, and no stored configuration.
+fn programmed() -> Vec<u8> {
+    static PROGRAMMED: LazyLock<Vec<u8>> = LazyLock::new(|| {
+        let mut flash = vec![0xFF; LAYOUT.part.flash_size];
+        let programmed = FIRMWARE.program(LAYOUT, &mut flash, false);
+        programmed.expect("the firmware fits");
+        flash
+    });
+    PROGRAMMED.clone()
+}
+
+/// Returns a board of this type, just powered on. Its flash is that of the configuration, or has the firmware under test
+/// and no settings. The loader is written into it.
+pub fn board(mut config: Config) -> Board {
+    let Firmware::Loaded(loader, _) = &*FIRMWARE else {
+        panic!("the board has a loader");
+    };
+    config.layout = LAYOUT;
+    config.chip.flash.get_or_insert_with(programmed);
+    Board::new(loader, config).expect("the loader fits")
 }
 
 /// Returns the configuration of a board with this module, which is also stored, and with more stored settings.
@@ -64,6 +100,9 @@ pub fn config(module: Module, settings: &[(u16, u16)]) -> Config {
         ..Config::default()
     }
 }
+
+/// Time that a unit has to start after power-on: at most 70 ms in the loader, and 100 ms in the application.
+pub const START: Time = Time::from_ms(200);
 
 /// Returns the CRC-16/MODBUS, calculated bit by bit as in the standard's appendix B: slow, but independent of the
 /// project's other code.
@@ -174,21 +213,20 @@ impl Bench {
     /// Returns a board with this configuration, powered and with time to start.
     pub fn with(config: Config) -> Self {
         let mut bench = Self::cold(config);
-        bench.board.run_for(Time::from_ms(150));
+        bench.board.run_for(START);
         bench
     }
 
     /// Returns a board that was powered just now, at the corner at which the tests run.
-    pub fn cold(config: Config) -> Self {
-        Self::of(image(), config)
+    pub fn cold(mut config: Config) -> Self {
+        config.chip.corner = corner();
+        Self::of(board(config))
     }
 
-    /// The same, with another image.
-    pub fn of(image: &Image, mut config: Config) -> Self {
-        config.layout = LAYOUT;
-        config.chip.corner = corner();
+    /// Returns a board and its master.
+    pub fn of(board: Board) -> Self {
         Self {
-            board: Board::new(image, config).expect("the image fits"),
+            board,
             settings: Settings::default(),
             sent: Time::ZERO,
             // Two characters at 921600 bit/s are less than the unit needs at the slow corner.
@@ -314,6 +352,13 @@ impl Bench {
         );
     }
 
+    /// Returns how many bytes of the stack were not used since the application's start, which paints it.
+    pub fn free_stack(&self) -> usize {
+        const PAINT: [u8; 4] = [0xCC; 4];
+        let (words, _) = self.board.ram().as_chunks();
+        4 * words.iter().take_while(|word| **word == PAINT).count()
+    }
+
     /// Asserts that the firmware did nothing that could fail on a real part.
     pub fn assert_sound(&mut self) {
         assert_eq!(self.board.findings(), [], "findings on the bus");
@@ -329,6 +374,10 @@ impl Drop for Bench {
         }
         if !self.tolerant {
             self.assert_sound();
+        }
+        if self.board.running_slot().is_some() {
+            let free = self.free_stack();
+            assert!(free >= 1024, "{free} bytes of the stack are free");
         }
         let findings = self.board.findings().iter();
         let stalled = findings.filter(|finding| matches!(finding.what, What::StalledRead { .. }));

@@ -3,25 +3,23 @@
 use sim::line::Received;
 use sim::{Board, Bus, Config, Module, Time};
 
-use crate::LAYOUT;
-use crate::bench::{FIRST, adu, config, corner, image};
+use crate::bench::{self, FIRST, START, adu, config, corner};
 
 /// Returns boards with these switches on one bus, with time to start.
 fn bus(dips: impl IntoIterator<Item = u8>) -> Bus {
     let boards = dips.into_iter().map(board).collect();
     let mut bus = Bus::new(boards);
-    bus.run_for(Time::from_ms(150));
+    bus.run_for(START);
     bus
 }
 
 fn board(dip: u8) -> Board {
     let mut config = Config {
         dip,
-        layout: LAYOUT,
         ..config(Module::Di4, &[])
     };
     config.chip.corner = corner();
-    Board::new(image(), config).expect("the image fits")
+    bench::board(config)
 }
 
 /// Sends these bytes now, waits 50 ms after their end, and returns what the master has received.
@@ -82,7 +80,7 @@ fn a_unit_that_loses_power_in_mid_reply_releases_the_line() {
             .iter()
             .all(|board| board.now() >= before + Time::from_ms(100))
     );
-    bus.run_for(Time::from_ms(150));
+    bus.run_for(START);
     assert!(read_inputs(&mut bus, 1).is_some());
 }
 
@@ -92,8 +90,8 @@ fn one_board_on_a_bus_behaves_like_a_board_without_a_bus() {
     let mut alone = board(1);
     let mut bus = Bus::new(vec![board(1)]);
     let request = adu(&[1, 2, 0, FIRST, 0, 4]);
-    alone.run_for(Time::from_ms(150));
-    bus.run_for(Time::from_ms(150));
+    alone.run_for(START);
+    bus.run_for(START);
     for _ in 0..3 {
         let now = alone.now();
         assert_eq!(bus.now(), now);

@@ -7,8 +7,8 @@ use register_map::update::{BLOCK_BYTES, Slot};
 use sim::line::Settings;
 use sim::{Board, Bus, Module, Time};
 
-use crate::FILES;
-use crate::bench::{FIRST, adu, path};
+use crate::LAYOUT;
+use crate::bench::{FIRST, adu, file};
 use crate::in_slots::{CHECK, START, flash, image, made};
 
 /// A line with boards that run from slot A.
@@ -178,9 +178,9 @@ impl Line {
 
     /// Updates all units. Returns the time of the blocks as a multiple of that of the image's bytes.
     pub fn update(&mut self) -> f64 {
-        let file = std::fs::read(path(FILES[3]));
-        let file = File::of(&file.expect("the file of the update")).expect("it is whole");
-        let image = file.image(Slot::B);
+        let update = std::fs::read(file(&format!("{}.modio", LAYOUT.board)));
+        let update = File::of(&update.expect("the file of the update")).expect("it is whole");
+        let image = update.image(Slot::B);
         let units =
             (1..=self.units).map(|unit| Unit::new(unit, Slot::B, image.words, Stage::Waiting));
         let mut campaign = Campaign::new(&image.blocks, units.collect(), false);

@@ -1,10 +1,9 @@
 //! A board whose core reuses code that it translated for another board runs like a board with a new core: the same
 //! instructions at the same instants, the same edges on the line, the same memories.
 
-use sim::{Board, Config, Corner, Finding, Module, Time, line::Received};
+use sim::{Config, Corner, Finding, Module, Time, line::Received};
 
-use crate::LAYOUT;
-use crate::bench::{Bench, FIRST, adu, config, corner, image};
+use crate::bench::{self, Bench, FIRST, adu, config, corner, symbol};
 
 /// Number of boards that are made to find a used core: other tests of this process may take the core that was left.
 const TRIES: usize = 1_000;
@@ -96,17 +95,16 @@ fn leave_a_core(left: usize) {
         Corner::Slow
     };
     let mut config = Config {
-        layout: LAYOUT,
         dip: 0xFF,
         module: Module::Ao4,
         ..with_core(false)
     };
     config.chip.corner = corner;
     config.chip.crystal = left.is_multiple_of(2);
-    let mut board = Board::new(image(), config).expect("the image fits");
-    board.run_for(Time::from_ms(60));
+    let mut board = bench::board(config);
+    board.run_for(Time::from_ms(120));
     // Replace the code that the core runs: in flash from its first instruction on, and in SRAM.
-    let start = image().entry() & !1;
+    let start = symbol("Reset") & !1;
     board.patch_code(start, &[0xFE, 0xE7].repeat(64)).unwrap();
     let ram = board.ram().len();
     board.ram_mut()[..ram / 2].fill(0xBF);

@@ -3,7 +3,7 @@
 
 use sim::{Channel, Module, Time};
 
-use crate::bench::{Bench, FIRST, SLOT, adu};
+use crate::bench::{Bench, FIRST, SLOT, adu, symbol};
 
 const HARD_FAULT: u16 = 2;
 const STACK_OVERFLOW: u16 = 5;
@@ -31,7 +31,7 @@ fn fault_in(bench: &mut Bench, handler: &str, code: &[u16]) -> u32 {
     bench.write_bits(SLOT, &[true; 4]).unwrap();
     let before = bench.board.resets();
     bench.board.watch_pin('A', 3);
-    let address = bench.board.symbol(handler).expect("a handler") & !1;
+    let address = symbol(handler) & !1;
     let bytes: Vec<u8> = code.iter().flat_map(|half| half.to_le_bytes()).collect();
     let from = bench.board.now();
     bench.board.line().send(from, &adu(&[1, 1, 0, FIRST, 0, 4]));

@@ -2,7 +2,7 @@
 
 use sim::{Module, Time};
 
-use crate::bench::{Bench, GOOD_MV, LOW_MV, SLOT, adu, config};
+use crate::bench::{Bench, GOOD_MV, LOW_MV, SLOT, START, adu, config};
 
 const FILTER: u16 = 0x0120 + SLOT;
 const UNSAVED: u16 = 8;
@@ -103,7 +103,7 @@ fn start_with_a_low_supply_serves_and_changes_no_flash() {
     let mut bench = Bench::cold(config(Module::Di4, &[]));
     bench.board.set_supply_mv(LOW_MV).unwrap();
     let operations = bench.board.flash_operations();
-    bench.board.run_for(Time::from_ms(150));
+    bench.board.run_for(START);
     bench.assert_answers(1);
     assert_eq!(bench.board.flash_operations(), operations);
     bench.board.set_supply_mv(GOOD_MV).unwrap();

@@ -7,7 +7,7 @@
 
 use sim::{Channel, Module, Time};
 
-use crate::bench::{Bench, FIRST, SLOT, adu, corner};
+use crate::bench::{Bench, FIRST, SLOT, adu, corner, symbol};
 
 /// Returns the longest time to the reset: 500 ms at 40 kHz, converted to the real LSI, and one more period of marks.
 fn limit() -> Time {
@@ -98,14 +98,14 @@ fn task_in_an_endless_loop_is_ended_by_a_watchdog_reset() {
     for handler in [
         "USART1", "TIM2", "TIM1_CC", "TIM4", "USART3", "EXTI4", "EXTI3", "EXTI1", "EXTI0",
     ] {
-        let address = bench.board.symbol(handler).expect("the task's handler");
+        let address = symbol(handler);
         break_at(&mut bench, handler, address, SPIN);
     }
 }
 
 /// Returns an address that a handler executes, some instructions after its entry.
 fn within(bench: &mut Bench, handler: &str) -> u32 {
-    let entry = bench.board.symbol(handler).expect("the task's handler") & !1;
+    let entry = symbol(handler) & !1;
     let now = bench.board.now();
     bench.board.line().send(now, &adu(&[1, 1, 0, FIRST, 0, 4]));
     assert!(bench.board.run_until_pc(entry, now + Time::from_ms(50)));
@@ -170,7 +170,7 @@ fn task_that_returns_without_setting_its_mark_causes_a_watchdog_reset() {
     ] {
         // A task that stops after its mark of this round has set that mark, so stop it in front of the mark.
         bench.board.run_for(Time::from_ms(20));
-        let address = bench.board.symbol(handler).expect("the task's handler");
+        let address = symbol(handler);
         let marks = break_at(&mut bench, handler, address, RETURN);
         assert_eq!(marks & missing, missing, "{handler}: {marks:#06b}");
     }
@@ -181,7 +181,7 @@ fn task_that_returns_without_setting_its_mark_causes_a_watchdog_reset() {
 fn record_has_the_uptime_and_survives_resets_but_not_a_power_cycle() {
     let mut bench = bench();
     bench.board.run_for(Time::from_secs(5));
-    let scan = bench.board.symbol("EXTI1").unwrap();
+    let scan = symbol("EXTI1");
     break_at(&mut bench, "scan", scan, SPIN);
     let uptime = bench.long(0x026A);
     assert!((6..=8).contains(&uptime), "{uptime} s");

@@ -4,13 +4,14 @@ use std::{fs, sync::LazyLock};
 
 use ed25519_dalek::{Signer as _, SigningKey};
 use register_map::configuration::MODULE;
+use register_map::part::FLASH_BASE;
 use register_map::update::crc32;
 use sha2::{Digest as _, Sha512};
-use sim::{Board, Config, Image, Module, Time, chip};
+use sim::{Board, Config, Module, Time, chip};
 
 use crate::{
-    FILES, LAYOUT,
-    bench::{Bench, PAGE_SIZE, PORT, corner, flash_with_settings, pages, path},
+    LAYOUT,
+    bench::{self, Bench, PORT, corner, file, flash_with_settings, pages},
 };
 
 /// Offset of the application in an image, and of fields in the header.
@@ -27,19 +28,15 @@ pub const START: Time = Time::from_ms(400);
 /// The longest check of an image, at the slow corner.
 pub const CHECK: Time = Time::from_ms(4_000);
 
-/// The loader, and the images for slots A and B.
-static BUILT: LazyLock<(Image, [Vec<u8>; 2])> = LazyLock::new(|| {
-    let [loader, a, b, _] = FILES.map(path);
-    let image = |file| fs::read(file).expect("the image can be read");
-    (
-        Image::read(&loader).expect("the loader can be read"),
-        [image(a), image(b)],
-    )
+/// The images for slots A and B.
+static BUILT: LazyLock<[Vec<u8>; 2]> = LazyLock::new(|| {
+    ["modio-a.image", "modio-b.image"]
+        .map(|name| fs::read(file(name)).expect("the image can be read"))
 });
 
 /// Returns the image for a slot, 0 or 1.
 pub fn image(slot: usize) -> Vec<u8> {
-    BUILT.1[slot].clone()
+    BUILT[slot].clone()
 }
 
 /// Returns the image for a slot with changes, and with the hash and the signature that belong to it.
@@ -72,19 +69,16 @@ pub fn unit(slots: [&[u8]; 2], settings: &[(u16, u16)]) -> Bench {
     holding(flash(slots, Module::Di4, settings), 1)
 }
 
-/// Returns a flash with the loader's images and the store at its place, and with a module and these settings in it.
+/// Returns a flash that was never started, with these images in its slots, and with a module and these settings in the
+/// store.
 pub fn flash(slots: [&[u8]; 2], module: Module, settings: &[(u16, u16)]) -> Vec<u8> {
-    let layout = LAYOUT.board.layout();
-    let offset = |address: u32| (address - 0x0800_0000) as usize;
     let module = [(MODULE + PORT - 1, module.code())];
-    let mut flash = flash_with_settings(&[&module, settings].concat());
     let [stored, _] = pages();
-    let page = flash[stored.clone()].to_vec();
-    flash[stored].fill(0xFF);
-    let store = offset(layout.store.first);
-    flash[store..store + PAGE_SIZE].copy_from_slice(&page);
-    for (address, image) in layout.slots.into_iter().zip(slots) {
-        let at = offset(address);
+    let page = flash_with_settings(&[&module, settings].concat())[stored.clone()].to_vec();
+    let mut flash = vec![0xFF; LAYOUT.part.flash_size];
+    flash[stored].copy_from_slice(&page);
+    for (address, image) in LAYOUT.board.layout().slots.into_iter().zip(slots) {
+        let at = (address - FLASH_BASE) as usize;
         flash[at..at + image.len()].copy_from_slice(image);
     }
     flash
@@ -97,27 +91,22 @@ pub fn holding(flash: Vec<u8>, dip: u8) -> Bench {
 
 /// The same, with a module.
 pub fn fitted(flash: Vec<u8>, module: Module, dip: u8) -> Bench {
-    let mut bench = Bench::of(&BUILT.0, config(flash, module, dip));
+    let mut bench = Bench::of(made(flash, module, dip));
     // The loader's reset after a check.
     bench.tolerant = true;
     bench
 }
 
-fn config(flash: Vec<u8>, module: Module, dip: u8) -> Config {
-    Config {
+/// Returns a board for a bus with several.
+pub fn made(flash: Vec<u8>, module: Module, dip: u8) -> Board {
+    let mut config = Config {
         dip,
         module,
         chip: chip::Config::holding(flash),
         ..Config::default()
-    }
-}
-
-/// Returns a board for a bus with several.
-pub fn made(flash: Vec<u8>, module: Module, dip: u8) -> Board {
-    let mut config = config(flash, module, dip);
-    config.layout = LAYOUT;
+    };
     config.chip.corner = corner();
-    Board::new(&BUILT.0, config).expect("the loader fits")
+    bench::board(config)
 }
 
 /// Runs until the unit answers, and returns that time.

@@ -5,7 +5,7 @@
 
 use sim::{Module, Time};
 
-use crate::bench::{Bench, SLOT, adu};
+use crate::bench::{Bench, SLOT, adu, symbol};
 
 const PULSES: u16 = 0x0300 + 2 * SLOT;
 const FILTER: u16 = 0x0120 + SLOT;
@@ -70,7 +70,7 @@ fn reset_at_any_instruction_of_an_update_loses_at_most_that_update() {
     bench.started();
 
     // A hard fault in the scan, and the start after it.
-    let scan = bench.board.symbol("EXTI1").expect("the handler") & !1;
+    let scan = symbol("EXTI1") & !1;
     let limit = bench.board.now() + Time::from_ms(5);
     assert!(bench.board.run_until_pc(scan, limit));
     let was = bench.board.patch_code(scan, &[0, 0xDE]).unwrap();

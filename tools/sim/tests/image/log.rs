@@ -4,7 +4,7 @@
 use sim::soc::map::Block;
 use sim::{Module, Time};
 
-use crate::bench::Bench;
+use crate::bench::{Bench, symbol};
 
 /// Offset of channel 0's flags in RTT's control block.
 const FLAGS: u32 = 44;
@@ -52,7 +52,7 @@ fn log_line_of_an_event_has_the_time_in_milliseconds() {
 #[ignore = "needs the image: cargo xtask test"]
 fn log_never_waits_for_a_reader_although_a_debugger_asks_for_it() {
     let mut bench = bench();
-    let block = bench.board.symbol("_SEGGER_RTT").expect("a control block");
+    let block = symbol("_SEGGER_RTT");
     bench
         .board
         .write_memory(block + FLAGS, &BLOCK_IF_FULL.to_le_bytes())

@@ -1,11 +1,12 @@
-//! The release image on the virtual board: its behaviour for a master on the line and for a person at the board.
+//! The release image behind its loader on the virtual board: its behaviour for a master on the line and for a person at
+//! the board.
 //!
 //! What a master sees of the unit's functions, registers and frames is tested by the conformance suite, and logic by
 //! the crates' own tests on the host. The tests here are about time, power, disturbances and the circuit.
 //!
-//! The image comes from `MODIO_ELF`, which `cargo xtask test` sets after building it. It is that of the modio-02. The
-//! tests of the modio-08's image are in `tests/image_08`; they use most of the files here as well, which name the
-//! board's first slot by [`bench::PORT`], [`bench::SLOT`] and [`bench::MODULE`].
+//! The board is a modio-02, as after the first start of its loader. `MODIO_IMAGES_MODIO_02`, which `cargo xtask test` sets,
+//! names the directory of loader and images. The tests of the modio-08's image are in `tests/image_08`; they use most of
+//! the files here as well, which name the board's first slot by [`bench::PORT`], [`bench::SLOT`] and [`bench::MODULE`].
 //!
 //! | what | where |
 //! |---|---|
@@ -17,18 +18,16 @@
 //! | the simulator | `cores`: boards of one process share translated code; `programmed`: loader and image in its flash |
 //! | the radio | `radio`, `air` |
 //! | the loader, and an update over the line | `loading`, `updating`, `campaign` |
+//! | the image without a loader, as on a Blue Pill | `alone` |
 //! | safety | `boot`, `clock`, `outputs_at_start`, `comm_watchdog`, `hung_task`, `faults`, `upsets`, `kept`, `stack`, `log`, `long_run` |
 
 use sim::board::{Layout, MODIO_02};
 
 /// The board that the image is for.
 const LAYOUT: &Layout = &MODIO_02;
-/// The variable that names the image.
-const ELF: &str = "MODIO_ELF";
-/// Those of the loader, of the signed images for slots A and B, and of the file of an update.
-const FILES: [&str; 4] = ["MODIO_LOADER", "MODIO_A", "MODIO_B", "MODIO_UPDATE"];
 
 mod air;
+mod alone;
 mod analog_inputs;
 mod analog_outputs;
 mod bench;

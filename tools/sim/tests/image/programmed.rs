@@ -6,14 +6,9 @@ use register_map::{configuration::MODULE, update::Slot};
 use sim::board::{Firmware, InSlot, MODIO_02};
 
 use crate::{
-    bench::{PORT, path},
+    bench::{PORT, file},
     in_slots::{START, answers, holding},
 };
-
-fn in_slot(file: &str) -> InSlot {
-    let file = fs::read(path(file)).expect("the image can be read");
-    InSlot::from_file(&MODIO_02, &file).expect("an image for the modio-02")
-}
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
@@ -21,21 +16,22 @@ fn programmed_board_starts_like_one_that_was_started_once() {
     let boot = (MODIO_02.board.layout().boot.first - 0x0800_0000) as usize;
     let boot = boot..boot + 2 * MODIO_02.part.page_size;
     let files = [
-        ("MODIO_UPDATE", Slot::A),
-        ("MODIO_A", Slot::A),
-        ("MODIO_B", Slot::B),
+        ("modio-02.modio", Slot::A),
+        ("modio-a.image", Slot::A),
+        ("modio-b.image", Slot::B),
     ];
-    for (file, starts) in files {
-        let loader = sim::Image::read(&path("MODIO_LOADER")).expect("the loader can be read");
-        let firmware = Firmware::Loaded(loader, in_slot(file));
+    for (name, starts) in files {
+        let loader = sim::Image::read(&file("loader")).expect("the loader can be read");
+        let image = InSlot::read(&MODIO_02, &file(name)).expect("an image for the modio-02");
+        let firmware = Firmware::Loaded(loader, image);
         let mut flash = vec![0xFF; MODIO_02.part.flash_size];
         firmware.program(&MODIO_02, &mut flash, false).unwrap();
         assert!(MODIO_02.store(&mut flash, &[(MODULE + PORT - 1, 1)]));
         let state = flash[boot.clone()].to_vec();
         let mut bench = holding(flash, 1);
         assert_eq!(bench.board.running_slot(), None, "the loader");
-        answers(&mut bench, START).expect(file);
-        assert_eq!(bench.board.running_slot(), Some(starts), "{file}");
+        answers(&mut bench, START).expect(name);
+        assert_eq!(bench.board.running_slot(), Some(starts), "{name}");
         assert_eq!(bench.board.resets(), 0, "no signature is checked");
         assert_eq!(
             bench.board.flash()[boot.clone()],
@@ -70,7 +66,7 @@ fn run(flash: &Path, options: &[&str]) -> String {
 fn flash_file_changes_between_an_image_alone_and_a_loader_with_one_line() {
     let directory = tempfile::tempdir().unwrap();
     let flash = directory.path().join("flash");
-    let [elf, loader, update] = ["MODIO_ELF", "MODIO_LOADER", "MODIO_UPDATE"].map(path);
+    let [elf, loader, update] = ["modio", "loader", "modio-02.modio"].map(file);
     let alone = ["--elf", elf.to_str().unwrap()];
     let loaded = [
         "--loader",

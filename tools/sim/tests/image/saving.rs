@@ -270,9 +270,9 @@ fn no_byte_is_lost_at_any_rate_while_saves_run() {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn uptime_and_communication_watchdog_are_right_over_many_erases() {
-    let settings = [&large()[..], &[(configuration::COMM_TIMEOUT, 1)]].concat();
-    let mut master = Master::new(Module::Do4, &settings);
+    let mut master = Master::new(Module::Do4, &large());
     master.write(0x0100, 0x5A17);
+    master.write(configuration::COMM_TIMEOUT, 1);
     let bench = &mut master.bench;
     bench.write_bits(SLOT, &[true; 4]).unwrap();
     // Waits until the uptime shows another second. Returns the time, about 20 ms late, and that second.

@@ -4,8 +4,7 @@ use register_map::codes::Baud;
 use register_map::configuration::{BAUD, FORMAT};
 use sim::{Board, Config, Module, Time};
 
-use crate::LAYOUT;
-use crate::bench::{FIRST, PORT, config, corner, image};
+use crate::bench::{self, FIRST, PORT, config, corner};
 use crate::fast_master::Master;
 
 /// A unit: its switch and the error of its crystal in ppm; `None` without a crystal.
@@ -23,7 +22,6 @@ fn master(baud: Baud, format_code: u16, units: &[Unit]) -> Master {
 fn board((dip, ppm): Unit, n: u8, stored: &[(u16, u16)]) -> Board {
     let mut config = Config {
         dip,
-        layout: LAYOUT,
         ..config(Module::Di4, stored)
     };
     config.chip.corner = corner();
@@ -32,7 +30,7 @@ fn board((dip, ppm): Unit, n: u8, stored: &[(u16, u16)]) -> Board {
         Some(ppm) => config.chip.crystal_hz = (8_000_000 + 8 * ppm) as u32,
         None => config.chip.crystal = false,
     }
-    Board::new(image(), config).expect("the image fits")
+    bench::board(config)
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use sim::{Module, Time};
 
+use crate::bench::symbol;
 use crate::fitted::{LINES, fitted};
 
 /// `udf #0`
@@ -20,7 +21,7 @@ fn a_fault_makes_the_lines_of_all_slots_floating_before_the_reset() {
             assert!(bench.board.is_output(port, pin) && bench.board.pin(port, pin));
         }
         let resets = bench.board.resets();
-        let address = bench.board.symbol(handler).expect("a handler") & !1;
+        let address = symbol(handler) & !1;
         let was = bench.board.patch_code(address, &UNDEFINED).unwrap();
         let from = bench.board.now();
         bench.board.line().send(from, &[1]);

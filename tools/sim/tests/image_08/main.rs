@@ -1,5 +1,5 @@
-//! The release image of the modio-08 on the virtual board. The image comes from `MODIO_ELF_08`, which `cargo xtask
-//! test` sets after building it.
+//! The release image of the modio-08 behind its loader, on the virtual board. `MODIO_IMAGES_MODIO_08`, which `cargo xtask
+//! test` sets, names the directory of loader and images.
 //!
 //! The tests of the four slots are in `slots`, `analog`, `digital` and `faults_of_slots`, those of function 70 in `fast`,
 //! those of links in `links`, of START = 0xFFFE in `as_it_was`. The other files are those of the modio-02's tests whose result depends on the board, with one
@@ -9,15 +9,6 @@ use sim::board::{Layout, MODIO_08};
 
 /// The board that the image is for.
 const LAYOUT: &Layout = &MODIO_08;
-/// The variable that names the image.
-const ELF: &str = "MODIO_ELF_08";
-/// Those of the loader, of the signed images for slots A and B, and of the file of an update.
-const FILES: [&str; 4] = [
-    "MODIO_LOADER_08",
-    "MODIO_A_08",
-    "MODIO_B_08",
-    "MODIO_UPDATE_08",
-];
 
 mod analog;
 mod as_it_was;

@@ -1,5 +1,5 @@
-//! The release image of the fx3u-24 on the virtual board: what differs from the boards with slots. The image comes from
-//! `MODIO_ELF_FX3U`, the loader and the image for slot A from the variables in `FILES`, which `cargo xtask test` sets.
+//! The release image of the fx3u-24 behind its loader, on the virtual board: what differs from the boards with slots.
+//! `MODIO_IMAGES_FX3U_24`, which `cargo xtask test` sets, names the directory of loader and images.
 //!
 //! The line, the store and the server are the same code as on the other boards, whose tests run at the corners.
 
@@ -13,14 +13,10 @@ use register_map::part::FLASH_BASE;
 use register_map::state;
 use sim::board::terminals::Value;
 use sim::board::{FX3U_24, Layout};
-use sim::{Board, Config, Image, Time, chip};
+use sim::{Config, Time, chip};
 
 /// The board that the image is for.
 const LAYOUT: &Layout = &FX3U_24;
-/// The variable that names the image.
-const ELF: &str = "MODIO_ELF_FX3U";
-/// Those of the loader and of the signed image for slot A.
-const FILES: [&str; 2] = ["MODIO_LOADER_FX3U", "MODIO_A_FX3U"];
 
 #[allow(dead_code, reason = "tests of other boards use the rest")]
 #[path = "../image/bench.rs"]
@@ -32,7 +28,7 @@ mod rs232;
 #[path = "../image/timing.rs"]
 mod timing;
 
-use bench::{Bench, corner, image, path};
+use bench::{Bench, corner, file, flash_with_settings};
 use fast_master::Master;
 
 /// Points of the first channel of ports 5, 7 and 8.
@@ -42,9 +38,8 @@ const AD0: u8 = 28;
 
 /// A board with these stored settings.
 fn board(settings: &[(u16, u16)]) -> Config {
-    let flash = LAYOUT.flash_with(settings);
     Config {
-        chip: chip::Config::holding(flash.expect("the settings fit in the store")),
+        chip: chip::Config::holding(flash_with_settings(settings)),
         ..Config::default()
     }
 }
@@ -164,12 +159,10 @@ fn analog_outputs_are_the_part_s_own_dac() {
 
 /// Returns a board that was powered just now, with the loader in front of these bytes.
 fn loaded(flash: Vec<u8>) -> Bench {
-    let loader = Image::read(&path(FILES[0])).expect("the loader can be read");
-    let config = Config {
+    let mut bench = Bench::cold(Config {
         chip: chip::Config::holding(flash),
         ..Config::default()
-    };
-    let mut bench = Bench::of(&loader, config);
+    });
     // The loader's reset after the check of an image.
     bench.tolerant = true;
     bench
@@ -206,7 +199,7 @@ fn assert_idle(bench: &mut Bench, time: Time) {
 fn line_stays_idle_from_power_on_to_the_first_reply() {
     let mut flash = vec![0xFF; LAYOUT.part.flash_size];
     let [slot, _] = LAYOUT.board.layout().slots;
-    let image = fs::read(path(FILES[1])).expect("the image can be read");
+    let image = fs::read(file("modio-a.image")).expect("the image can be read");
     let at = (slot - FLASH_BASE) as usize;
     flash[at..at + image.len()].copy_from_slice(&image);
     let mut bench = loaded(flash);
@@ -286,11 +279,10 @@ fn scan_finds_units_whose_start_bits_are_seen_by_an_interrupt() {
     for baud in [Baud::B9600, Baud::B115200, Baud::B921600] {
         let units = [200, -200, 0].into_iter().zip(0..).map(|(ppm, n)| {
             let mut config = board(&[(BAUD, baud.code())]);
-            config.layout = LAYOUT;
             config.chip.corner = corner();
             config.chip.unique_id[11] = n;
             config.chip.crystal_hz = (8_000_000 + 8 * ppm) as u32;
-            Board::new(image(), config).expect("the image fits")
+            bench::board(config)
         });
         let mut master = Master::new(baud, 0, units.collect());
         for _ in 0..5 {

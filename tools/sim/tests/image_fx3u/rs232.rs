@@ -8,7 +8,7 @@ use sim::Time;
 use sim::board::terminals::Value;
 use sim::line::{Format, Settings};
 
-use crate::bench::{Bench, adu};
+use crate::bench::{Bench, START, adu};
 use crate::{board, set, unit, words};
 
 /// Rate and format of the socket.
@@ -129,7 +129,7 @@ fn masters_at_both_lines_get_every_reply_and_each_line_has_its_counters() {
         poll(&mut bench, [&mut line, &mut socket], Time::from_secs(2));
         assert!(line.count > 60 && socket.count > 60);
         // The counters of the other line are up to 100 ms old.
-        bench.board.run_for(Time::from_ms(150));
+        bench.board.run_for(START);
         let read = words(&mut bench, second::BUS_MESSAGES, 9);
         let expected = [socket.count, 0, 0, socket.count, 0, 0, 0, 0, 0];
         assert_eq!(read, expected, "{baud:?}");

@@ -5,7 +5,6 @@ The board's time and the page's stand still between steps, so a picture hardly c
 
 import argparse
 import math
-import os
 import pathlib
 import socket
 import sys
@@ -166,12 +165,8 @@ def take_all(to: pathlib.Path, schemes=("light", "dark")):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--sim", required=True, type=pathlib.Path)
-    parser.add_argument("--elf", required=True, type=pathlib.Path)
-    parser.add_argument("--elf-08", required=True, type=pathlib.Path)
     parser.add_argument("--to", required=True, type=pathlib.Path, help="the directory of the pictures")
     options = parser.parse_args()
-    os.environ |= {"MODIO_SIM": str(options.sim), "MODIO_ELF": str(options.elf), "MODIO_ELF_08": str(options.elf_08)}
     options.to.mkdir(parents=True, exist_ok=True)
     take_all(options.to)
 

@@ -1,10 +1,10 @@
-"""Tests the firmware image in simulation with pymodbus, an independent Modbus master, and with it the Python client
-of the simulator.
+"""Tests loader and image in simulation with pymodbus, an independent Modbus master, and with it the Python client of the
+simulator.
 
-`cargo xtask test` creates the virtual environment and runs these tests, and with `--tests` those of the simulator's
-page. To run them directly:
+`cargo xtask test` creates the virtual environment, sets the variables with the program and the images, and runs these
+tests, and with `--tests` those of the simulator's page. To run them directly:
 
-    python run.py --sim target/debug/modio-sim --elf target/thumbv7m-none-eabi/firmware/modio
+    MODIO_SIM=target/debug/modio-sim MODIO_IMAGES_MODIO_02=target/thumbv7m-none-eabi/firmware python run.py
 """
 
 import argparse
@@ -24,25 +24,9 @@ ALONE = "test_mbpoll.py"
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--sim", required=True, type=pathlib.Path, help="the program modio-sim")
-    parser.add_argument("--elf", required=True, type=pathlib.Path, help="the image of the modio-02")
-    parser.add_argument("--elf-08", type=pathlib.Path, help="the image of the modio-08")
-    parser.add_argument("--elf-fx3u", type=pathlib.Path, help="the image of the fx3u-24")
-    parser.add_argument("--loader", type=pathlib.Path, help="the loader of the modio-02")
-    parser.add_argument("--update", type=pathlib.Path, help="the file of an update of the modio-02")
     parser.add_argument("--tests", type=pathlib.Path, help="the tests of this directory instead")
     parser.add_argument("--only", type=pathlib.Path, metavar="FILE", help="the tests of one file")
     options = parser.parse_args()
-    # The tests and the client read these variables.
-    for variable, file in (
-            ("MODIO_SIM", options.sim), ("MODIO_ELF", options.elf), ("MODIO_ELF_08", options.elf_08),
-            ("MODIO_ELF_FX3U", options.elf_fx3u),
-            ("MODIO_LOADER", options.loader), ("MODIO_UPDATE", options.update)):
-        if file is None:
-            continue
-        if not file.is_file():
-            parser.error(f"there is no file {file}")
-        os.environ[variable] = str(file.resolve())
     if options.only is not None:
         return tests_of(options.only)
     return all_files([options.tests] if options.tests else [HERE, CLIENT / "tests"])

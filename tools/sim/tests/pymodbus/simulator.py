@@ -1,6 +1,7 @@
 """A simulator with masters on its RS-485 line."""
 
 import os
+import pathlib
 import time
 import unittest
 
@@ -23,6 +24,16 @@ GIVE_UP = 0.5
 TOO_SLOW = "modio-sim: warning: this computer has run the boards at"
 
 
+def images(board: str = "modio-02") -> pathlib.Path:
+    """Returns the directory with the loader and the images of a board. `cargo xtask test` sets the variables."""
+    return pathlib.Path(os.environ["MODIO_IMAGES_" + board.upper().replace("-", "_")])
+
+
+def firmware(board: str = "modio-02") -> list[str]:
+    """Returns the options with which a simulator runs the loader and the image of a board."""
+    return ["--loader", str(images(board) / "loader"), "--image", str(images(board) / "modio-a.image")]
+
+
 class Simulator(modio_sim.Simulator):
     """A simulator, and the operations of masters on its line."""
 
@@ -31,9 +42,8 @@ class Simulator(modio_sim.Simulator):
 
     @classmethod
     def of(cls, *, board: str = "modio-02", options=(), **more) -> "Simulator":
-        """Starts a simulator with the image for this board, which run.py names."""
-        image = {"modio-02": "MODIO_ELF", "modio-08": "MODIO_ELF_08", "fx3u-24": "MODIO_ELF_FX3U"}[board]
-        return cls.start(board=board, elf=os.environ[image], options=options, **more)
+        """Starts a simulator with the loader and the image of this board."""
+        return cls.start(board=board, options=[*firmware(board), *options], **more)
 
     def end_well(self):
         """Ends the simulator as Ctrl-C does. It must end without an error, and without any output on stderr but the warning

@@ -3,13 +3,14 @@
 import os
 import pathlib
 import re
+import shlex
 import subprocess
 import sys
 import tempfile
 import unittest
 
 import modio_sim
-from simulator import Simulator
+from simulator import Simulator, firmware, images
 
 ROOT = pathlib.Path(__file__).resolve().parents[4]
 
@@ -19,9 +20,10 @@ class Example(unittest.TestCase):
         text = (ROOT / "docs/simulator-http.md").read_text()
         [(program, printed)] = re.findall(r"```python\n(.+?)```\n\n```text\n(.+?)```", text, re.DOTALL)
         with tempfile.TemporaryDirectory() as directory:
-            # Adds the option for the image, which a released simulator does not need.
+            # Adds the options for loader and image, which a released simulator does not need.
             simulator = pathlib.Path(directory, "modio-sim")
-            simulator.write_text(f'#!/bin/sh\nexec "{os.environ["MODIO_SIM"]}" --elf "{os.environ["MODIO_ELF"]}" "$@"\n')
+            command = shlex.join([os.environ["MODIO_SIM"], *firmware()])
+            simulator.write_text(f'#!/bin/sh\nexec {command} "$@"\n')
             simulator.chmod(0o755)
             client = str(pathlib.Path(modio_sim.__file__).parents[1])
             run = subprocess.run(
@@ -35,8 +37,8 @@ class Update(unittest.TestCase):
         text = (ROOT / "docs/update.md").read_text()
         [program] = [part for part in re.findall(r"```python\n(.+?)```", text, re.DOTALL) if "pymodbus" in part]
         self.assertLessEqual(program.count("\n"), 40)
-        loader, image = os.environ["MODIO_LOADER"], os.environ["MODIO_UPDATE"]
-        simulator = Simulator.start(options=["--loader", loader, "--image", image])
+        image = images() / "modio-02.modio"
+        simulator = Simulator.of()
         self.addCleanup(simulator.end_well)
         # At 9600 bit/s the update takes minutes.
         master = simulator.master()

@@ -5,10 +5,9 @@ use register_map::{
     second,
 };
 use sim::radio::{Parameters, timing};
-use sim::{Board, Bus, Config, Corner, Module, Time};
+use sim::{Bus, Config, Corner, Module, Time};
 
-use crate::LAYOUT;
-use crate::bench::{adu, config, image};
+use crate::bench::{self, adu, config};
 use crate::radio::SET_UP;
 
 /// The rates of LORA_AIR_RATE in bit/s.
@@ -36,11 +35,10 @@ impl Air {
             let mut config = Config {
                 dip,
                 radio: Some(Parameters::FACTORY),
-                layout: LAYOUT,
                 ..config(Module::Di4, &[(LORA, 1), (LORA_AIR_RATE, code)])
             };
             config.chip.corner = corner;
-            Board::new(image(), config).expect("the image fits")
+            bench::board(config)
         };
         let mut bus = Bus::new([1, 2, 3].map(board).into());
         bus.run_for(SET_UP);
