@@ -6,7 +6,7 @@ use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 use register_map::Module;
 use register_map::board::{ETH_IO5R, FX3U_24};
 
-use super::{elf, failed, in_process, line, modio_08, named, passed};
+use super::{failed, in_process, line, modio_08, named, of, passed};
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
@@ -14,8 +14,8 @@ fn pulses_delay_a_reply_by_a_character_at_most_at_high_rates_on_every_board() {
     let cases = named(&["damage/noise-behind-a-frame"]);
     let boards = [
         modio_08([Module::Di4, Module::Do4, Module::Ai4, Module::Ao4]),
-        Fitting::new(elf(&FX3U_24), &FX3U_24),
-        Fitting::new(elf(&ETH_IO5R), &ETH_IO5R),
+        of(&FX3U_24),
+        of(&ETH_IO5R),
     ];
     let mut fittings = Vec::new();
     for board in boards {

@@ -73,7 +73,6 @@ fn outputs_start_as_a_master_and_a_link_left_them_ten_seconds_before_the_power_w
         let edges = bench.board.pin_edges(line, pin).iter();
         let edges: Vec<_> = edges.filter(|edge| edge.0 >= from).collect();
         match (on, &edges[..]) {
-            (true, [(at, true)]) => println!("SOON as it was {}", *at - from),
             (true, [(at, true)]) => assert!(*at - from <= SOON, "{:?}", *at - from),
             (false, []) => {}
             _ => panic!("output {n}: {edges:?}"),
