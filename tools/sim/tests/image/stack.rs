@@ -10,7 +10,8 @@ fn free_stack_is_in_its_register() {
     let mut bench = Bench::set_up(Module::Ai2Ao2, &[]);
     bench.configure(0x0120, &[7; 30]);
     bench.save();
-    bench.board.run_for(Time::from_ms(50));
+    // The unit checks a part of the stack at a time.
+    bench.board.run_for(Time::from_secs(1));
     let free = bench.register(0x020B);
     assert_eq!(usize::from(free), bench.free_stack());
 }
