@@ -128,7 +128,13 @@ impl Unit<'_> {
         let mut channels = *self.device.points.ports()[slot].channels();
         channels.set_bit(usize::from(number & 3), value & 1 != 0);
         channels.set_word(usize::from(number & 3), value & 0xFFF);
-        self.device.scanned(slot, &channels, &[None; 4], true, if number & 16 == 0 { 1 } else { 40 });
+        self.device.scanned(
+            slot,
+            &channels,
+            &[None; 4],
+            true,
+            if number & 16 == 0 { 1 } else { 40 },
+        );
         (0..4).for_each(|slot| self.device.run_links(slot));
     }
 

@@ -5,6 +5,11 @@ use register_map::links;
 
 use super::{Device, IoPort};
 use crate::links::{AFTER_POWER_ON_MS, OF_A_SLOT, Outputs, Source, Sources};
+use crate::{HAS_EVENTS, HAS_SLOTS};
+
+/// The board can have analog inputs. Without them nothing of what judges their codes is in the image: the eth-io5r has
+/// relays and digital inputs only, and no room for it.
+const HAS_ANALOG: bool = HAS_SLOTS || HAS_EVENTS;
 
 /// The links of a device with `SLOTS` slots, while they run.
 #[derive(Debug)]
@@ -158,7 +163,8 @@ impl<const SLOTS: usize> Device<SLOTS> {
             && let Some(sources) = self.linking.sources.get_mut(slot)
         {
             for (channel, (code, settings)) in codes.iter().zip(port.settings()).enumerate() {
-                if let Some(code) = code
+                if HAS_ANALOG
+                    && let Some(code) = code
                     && port.kind(channel) == Kind::WordInput
                 {
                     sources.add_code(channel, *code, settings);
@@ -296,7 +302,7 @@ fn source(port: &IoPort, sources: &Sources, channel: usize) -> Source {
         Source::NoValue {
             good: sources.is_good(channel),
         }
-    } else if port.kind(channel) == Kind::BitInput {
+    } else if !HAS_ANALOG || port.kind(channel) == Kind::BitInput {
         Source::Bit(channels.bit(channel))
     } else if sources.is_uncertain(channel) {
         Source::Uncertain
