@@ -360,8 +360,8 @@ pub fn images(
 }
 
 /// Runs tests that run the loader and the images of these boards in the simulator, as an ordinary user: those of these
-/// targets whose names contain one of `names`, or all. Spaces separate targets and names. A name that begins with `--` is an option of the tests. The
-/// variables choose the corner of the part, and how long a test is.
+/// targets whose names contain one of `names`, or all. Spaces separate targets and names. A name that begins with `--` is
+/// an option of the tests. The variables choose the corner of the part, and how long a test is.
 pub fn simulated(
     workspace: &mut Workspace,
     boards: &[&'static Board],
