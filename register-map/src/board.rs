@@ -184,7 +184,7 @@ const ROWS: [Row; 5] = [
         memory: Memory {
             part: STM32F103CB,
             smaller: None,
-            stack: 8 * KIB + 512,
+            stack: 9 * KIB,
             interrupts: ["USART2", "USART3", "EXTI2"],
         },
     },
