@@ -36,11 +36,8 @@ fn pulses_delay_a_reply_by_a_character_at_most_at_high_rates_on_every_board() {
         .into_par_iter()
         .flat_map_iter(|fitting| {
             let outcomes = in_process(&fitting, &cases);
-            assert_eq!(
-                passed(&outcomes) + failed(&outcomes).len(),
-                1,
-                "the case runs"
-            );
+            // This case and the one about the stack.
+            assert_eq!(passed(&outcomes) + failed(&outcomes).len(), 2, "both run");
             let rows = failed(&outcomes).into_iter();
             rows.map(move |row| format!("{} {}: {row}", fitting.board, fitting.line))
         })
