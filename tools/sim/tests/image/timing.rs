@@ -8,8 +8,12 @@ use crate::bench::{Bench, FIRST, Most, adu, ascii, corner};
 
 /// From t3.5 to the write of the first byte to the UART's data register. The baud generator adds up to a bit.
 const LATE: Most = Most(Time::from_us(25), Time::from_us(45));
-/// How much longer the scan of more than four ports may delay it.
-const SCAN: Time = Time::from_us(if LAYOUT.board.slots > 4 { 25 } else { 0 });
+/// How much longer the scan may delay it: it holds the points of all ports, or of all terminals, at once.
+const SCAN: Time = Time::from_us(match LAYOUT.board.slots {
+    0 => 50,
+    1..=4 => 0,
+    _ => 25,
+});
 /// From enabling the driver to the write of the first byte to the UART's data register.
 const ON: Most = Most(Time::from_us(1), Time::from_us(1));
 /// From the last stop bit to disabling the driver.
