@@ -8,12 +8,11 @@ use crate::bench::{Bench, FIRST, Most, adu, ascii, corner};
 
 /// From t3.5 to the write of the first byte to the UART's data register. The baud generator adds up to a bit.
 const LATE: Most = Most(Time::from_us(25), Time::from_us(45));
-/// How much longer the scan may delay it: it holds the points of all ports, or of all terminals, at once.
-const SCAN: Time = Time::from_us(match LAYOUT.board.slots {
-    0 => 50,
-    1..=4 => 0,
-    _ => 25,
-});
+/// How much longer the scan may delay it: it holds the points of all ports and terminals at once.
+const SCAN: Most = match LAYOUT.board.slots {
+    ..=4 => Most(Time::from_us(25), Time::from_us(50)),
+    _ => Most(Time::from_us(50), Time::from_us(110)),
+};
 /// From enabling the driver to the write of the first byte to the UART's data register.
 const ON: Most = Most(Time::from_us(1), Time::from_us(1));
 /// From the last stop bit to disabling the driver.
@@ -39,7 +38,7 @@ fn reply_starts_at_t35_and_the_driver_is_on_only_for_the_reply() {
         assert!(turnaround >= Settings::T35, "{turnaround:?} is before t3.5");
         let late = turnaround - Settings::T35;
         // The receiver may see the end of the request up to a sixteenth of a bit early, which t3.5 allows for.
-        let most = bit + sixteenth + LATE.of(corner()) + SCAN;
+        let most = bit + sixteenth + LATE.of(corner()) + SCAN.of(corner());
         assert!(late <= most, "{late:?} after t3.5");
 
         let edges: Vec<_> = line.driver_edges().collect();
