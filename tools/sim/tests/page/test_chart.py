@@ -23,8 +23,8 @@ class Lanes(OnPage):
         levels = lambda lane: [corner.split(",")[1] for corner in self.corners(lane)]
         self.eventually(lambda: levels(1), ["36.0", "36.0", "24.0", "24.0", "36.0", "36.0"])
         up, down, end = (float(self.corners(1)[n].split(",")[0]) for n in (1, 3, 5))
-        # 600 units are 60 s. A change is sent with the next state, up to 100 ms later.
-        self.assertAlmostEqual(down - up, (changes_ms[1] - changes_ms[0]) / 100, delta=3)
+        # 600 units are 60 s. A change is sent with the next state, after 100 ms or, on a busy computer, some more.
+        self.assertAlmostEqual(down - up, (changes_ms[1] - changes_ms[0]) / 100, delta=10)
         self.assertEqual(end, 600)
         self.assertEqual(levels(0), ["16.0", "16.0"])
         expect(self.page.locator("#lanes")).to_have_attribute("aria-label", re.compile("p5.1 off, p5.2 off"))

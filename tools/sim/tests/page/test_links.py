@@ -79,6 +79,27 @@ class Links(OnPage):
         self.eventually(self.unit, [8, 2, 180, 0xFFC9])
         expect(self.page.locator("#links-rows tr")).to_contain_text("°C")
 
+    def test_value_that_is_typed_while_another_change_is_written_is_kept(self):
+        self.write(RANGE, [2])
+        self.write(SCALE, [1])
+        self.write(LINKS[0], [8, 1, 180, 150])
+        self.read()
+        held = []
+        self.page.route("**/pdu", lambda route: held.append(route))
+        self.page.get_by_label("Action of link 1 of p2.1").select_option(label="invert")
+        lower = self.page.get_by_label("Lower threshold of link 1 of p2.1")
+        lower.fill("-5.5")
+        self.eventually(lambda: len(held), 1)
+        self.page.unroute("**/pdu")
+        held[0].fallback()
+        self.eventually(self.unit, [8, 2, 180, 150])
+        # The page has the reply.
+        self.page.wait_for_timeout(500)
+        self.assertEqual(self.unit(), [8, 2, 180, 150], "half a value was written")
+        self.page.keyboard.press("Enter")
+        self.eventually(self.unit, [8, 2, 180, 0xFFC9])
+        expect(self.page.locator("#links-rows tr")).to_contain_text("on below")
+
     def test_refused_value_is_reported_and_the_link_stays(self):
         self.write(LINKS[0], [0, 4, 20, 0])
         self.read()

@@ -25,6 +25,8 @@ let points = { inputs: [], outputs: [] };
 let links = [];
 /** RANGE and SCALE of each point. */
 let meaning = [];
+/** Whether the page shows old words, because the user was typing when new ones came. */
+let isStale = false;
 /** Fulfilled when the last change has been written. */
 let previous = Promise.resolve();
 
@@ -62,6 +64,7 @@ export function show(state) {
 /** Removes the links, before those of other modules or of another board are read. */
 export function forget() {
   links = [];
+  isStale = false;
   byId("links").hidden = true;
   byId("links-save").hidden = true;
 }
@@ -105,7 +108,7 @@ function change(link, words) {
     const isWritten = await modbus.write(link.register, wanted, `Link ${link.number} of ${link.output}`);
     if (isWritten) link.words = wanted;
     // Its fields show another value already, and the user may be typing the next one.
-    if (!isWritten || wanted[0] !== before[0] || actionOf(wanted) !== actionOf(before)) draw();
+    if (isStale || !isWritten || wanted[0] !== before[0] || actionOf(wanted) !== actionOf(before)) draw();
   });
 }
 
@@ -129,8 +132,15 @@ function withAction(words, action) {
 
 const withWhen = (words, when) => words.with(1, actionOf(words) | when);
 
+/** Draws the links, but not while the user is typing a value, which would be lost: then when the field is left. */
 function draw() {
-  const focused = document.activeElement?.id;
+  const active = document.activeElement;
+  isStale = byId("links-rows").contains(active) && active.type === "number" && active.value !== active.defaultValue;
+  if (isStale) {
+    active.addEventListener("blur", () => previous.then(() => isStale && draw()), { once: true });
+    return;
+  }
+  const focused = active?.id;
   const used = links.filter(({ words }) => !isNone(words));
   const free = links.filter((link) => isNone(link.words)
     && !links.some((other) => other.output === link.output && other.number < link.number && isNone(other.words)));
@@ -140,7 +150,10 @@ function draw() {
   setText(byId("links-none"), used.length === 0 ? "The unit has no links." : "");
   byId("links").hidden = false;
   byId("links-save").hidden = false;
-  if (focused) byId(focused)?.focus();
+  if (!focused) return;
+  byId(focused)?.focus();
+  // What is typed next replaces the text, as in a field that was just entered.
+  byId(focused)?.select?.();
 }
 
 function row(link) {
@@ -178,12 +191,13 @@ function values(link, name) {
     const made = element("input", {
       id: `link-${link.register}-${at}`, type: "number", step, "aria-label": `${label} of ${name}`,
       onchange: () => {
+        made.defaultValue = made.value;
         const value = Math.round(made.valueAsNumber / step);
         if (Number.isFinite(value)) change(link, (words) => words.with(at, value & 0xffff));
         else draw();
       },
     });
-    made.value = (number * step).toFixed(Math.max(0, -exponent));
+    made.defaultValue = (number * step).toFixed(Math.max(0, -exponent));
     return element("label", {}, `${text} `, made);
   };
   if (!isAnalog(source)) return actionOf(link.words) === pulse ? [field(2, "Time", -1, "for"), " s"] : [];
