@@ -141,7 +141,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
         }
     }
 
-    /// Advances the links by `ms` milliseconds, at the begin of a scan. `second`: a second of the uptime has begun.
+    /// Advances the links by `ms` milliseconds, at the beginning of a scan. `second`: a second of the uptime has begun.
     pub(super) fn tick_links(&mut self, ms: u32, second: bool) {
         if !links::exist(SLOTS) {
             return;

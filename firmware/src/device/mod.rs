@@ -194,7 +194,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
         }
     }
 
-    /// Advances the time by `ms` milliseconds, at the begin of a scan. When the communication watchdog expires, sets the
+    /// Advances the time by `ms` milliseconds, at the beginning of a scan. When the communication watchdog expires, sets the
     /// outputs to SAFE that no level link holds, and returns true.
     pub fn tick(&mut self, ms: u32) -> bool {
         let second = self.state.tick(ms);
