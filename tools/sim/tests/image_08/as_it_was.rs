@@ -16,6 +16,8 @@ const LAMP: u16 = 3;
 const BUTTON: u16 = 4;
 const ANALOG: u16 = 8;
 
+/// Half-words of a record of these outputs: head, a pair of the 4DO, two of the 4AO, CRC and seals.
+const RECORD: u64 = 5 + 6 + 4;
 /// Time after which a change is stored: the time between two comparisons, and some for the record.
 const STORED: Time = Time::from_ms(RECORD_AFTER_S as u64 * 1000 + 50);
 /// Longest time from power-on until outputs have their values.
@@ -54,8 +56,7 @@ fn outputs_start_as_a_master_and_a_link_left_them_ten_seconds_before_the_power_w
     press(&mut bench);
     bench.write(ANALOG, &[1234, 4095, 77]).unwrap();
     bench.board.run_for(STORED);
-    // Head, a pair of the 4DO, two of the 4AO, CRC and seals.
-    assert_eq!(bench.board.flash_operations() - operations, 5 + 6 + 4);
+    assert_eq!(bench.board.flash_operations() - operations, RECORD);
 
     bench.board.power_off();
     bench.board.run_for(Time::from_ms(100));
@@ -203,8 +204,7 @@ fn requests_during_a_record_are_not_late() {
     bench.board.run_for(wait);
     let operations = bench.board.flash_operations();
     let end = bench.board.now() + Time::from_ms(1_000);
-    // Head, a pair, CRC and seals.
-    while bench.board.flash_operations() < operations + 5 + 2 + 4 {
+    while bench.board.flash_operations() < operations + RECORD {
         assert!(bench.board.now() < end, "no record was written");
         for pdu in [&[1, 1, 0, 0, 0, 4][..], &[1, 3, 1, 0x20, 0, 32]] {
             let (reply, late) = bench.hurry(Time::ZERO, &adu(pdu));
