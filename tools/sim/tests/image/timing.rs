@@ -10,7 +10,8 @@ use crate::bench::{Bench, FIRST, Most, adu, ascii, corner};
 const LATE: Most = Most(Time::from_us(25), Time::from_us(45));
 /// How much longer the scan may delay it: it holds the points of all ports and terminals at once.
 const SCAN: Most = match LAYOUT.board.slots {
-    ..=4 => Most(Time::from_us(25), Time::from_us(50)),
+    ..=1 => Most(Time::ZERO, Time::ZERO),
+    2..=4 => Most(Time::from_us(25), Time::from_us(50)),
     _ => Most(Time::from_us(50), Time::from_us(110)),
 };
 /// From enabling the driver to the write of the first byte to the UART's data register.
