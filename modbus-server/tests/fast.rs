@@ -17,6 +17,8 @@ const ADDRESS: u8 = 5;
 struct Device {
     points: Points,
     events: Vec<(u16, u16)>,
+    /// Number of events in front that the packet has.
+    in_packet: usize,
     is_high: bool,
     has_started: bool,
     set: Vec<(u8, u16, Setting)>,
@@ -34,13 +36,20 @@ impl EventSource for Device {
         self.has_started
     }
 
+    fn start_is_known(&mut self) {
+        self.has_started = false;
+    }
+
     fn fill(&mut self, packet: &mut Packet) {
-        while let Some((id, value)) = self.events.first() {
-            if !packet.push(Kind::DiscreteInput, *id, *value) {
-                break;
-            }
-            self.events.remove(0);
-        }
+        let mut events = self.events.iter();
+        self.in_packet = events
+            .position(|(id, value)| !packet.push(Kind::DiscreteInput, *id, *value))
+            .unwrap_or(self.events.len());
+    }
+
+    fn sent(&mut self) {
+        self.events.drain(..self.in_packet);
+        self.in_packet = 0;
     }
 }
 
@@ -119,6 +128,7 @@ impl Unit {
             device: Device {
                 points: Points::new(40, 130),
                 events: Vec::new(),
+                in_packet: 0,
                 is_high: false,
                 has_started: true,
                 set: Vec::new(),
@@ -335,7 +345,7 @@ fn a_packet_is_sent_again_unchanged_until_it_is_confirmed() {
     let first = bytes("05 46 11 00 01 05 01 02 01 D0 01");
     assert_eq!(unit.fetch(0, 0), (0b1001, first.clone()));
     // A new event waits, and has high priority; the packet is the same.
-    unit.device.events = vec![(1, 1)];
+    unit.device.events.push((1, 1));
     unit.device.is_high = true;
     assert_eq!(unit.fetch(0, 0), (0b1000, first.clone()));
     // After two packets in a row others go first.
@@ -482,14 +492,74 @@ fn room_and_least_address_limit_a_packet() {
 }
 
 #[test]
-fn the_start_is_reported_in_every_packet_until_it_is_switched_off() {
+fn the_start_is_reported_until_two_packets_in_a_row_are_confirmed_or_it_is_switched_off() {
     let mut unit = Unit::new(Part::Everything);
-    for flag in [0, 1, 0] {
-        let packet = [5, 0x46, 0x11, flag, 1, 4, 0, 0x0F, 0, 0];
-        assert_eq!(unit.fetch(5, flag ^ 1).1, packet);
+    let packet = |flag| vec![5, 0x46, 0x11, flag, 1, 4, 0, 0x0F, 0, 0];
+    let none = (0b1111, bytes("FD 46 12"));
+    assert_eq!(unit.fetch(5, 0).1, packet(0));
+    // The confirmation of a packet from before the start fits this one.
+    assert_eq!(unit.fetch(5, 0).1, packet(1));
+    for _ in 0..10 {
+        assert_eq!(unit.fetch(5, 0).1, packet(1), "the same confirmation again");
     }
+    assert_eq!(unit.fetch(5, 1), none);
+    assert!(!unit.device.has_started);
+    // A master may switch it on again, and off.
+    unit.device.has_started = true;
+    assert_eq!(unit.fetch(0, 0).1, packet(0));
     unit.device.has_started = false;
-    assert_eq!(unit.fetch(5, 0), (0b1111, bytes("FD 46 12")));
+    assert_eq!(unit.fetch(5, 0), none);
+}
+
+#[test]
+fn a_packet_that_lost_is_made_again_of_what_waits_then() {
+    let mut unit = Unit::new(Part::Everything);
+    unit.device.has_started = false;
+    unit.device.events = vec![(7, 1), (8, 1), (9, 0)];
+    let fetch = bytes("FD 46 10 00 64 05 01");
+    assert_eq!(unit.ask_losing_in(&fetch, Some(0)), Answer::Silence);
+    // Sub-function 18 has switched point 8 off.
+    unit.device.events.remove(1);
+    assert_eq!(unit.ask_losing_in(&fetch, Some(0)), Answer::Silence);
+    unit.device.events.push((10, 1));
+    // The reply does not reach the master, which holds an old confirmation.
+    let packet = bytes("05 46 11 00 03 0F 01 02 00 07 01 01 02 00 09 00 01 02 00 0A 01");
+    assert_eq!(unit.fetch(5, 1).1, packet);
+    unit.device.events.push((11, 1));
+    assert_eq!(unit.fetch(5, 1).1, packet);
+    assert_eq!(
+        unit.fetch(5, 0).1,
+        bytes("05 46 11 01 01 05 01 02 00 0B 01")
+    );
+    assert_eq!(unit.fetch(5, 1).1, bytes("FD 46 12"));
+}
+
+#[test]
+fn after_four_packets_in_a_row_the_least_unit_asked_says_once_that_there_are_no_events() {
+    let mut unit = Unit::new(Part::Everything);
+    unit.device.has_started = false;
+    let mut ask = |least: u8| {
+        unit.device.events.push((7, 1));
+        let request = [0xFD, 0x46, 0x10, least, 100, 0, 0];
+        match unit.ask(&request) {
+            Answer::After(value, 12, reply) => (value >> 8, reply[2]),
+            other => panic!("{other:02X?}"),
+        }
+    };
+    let round = [
+        (0b1001, 0x11),
+        (0b1001, 0x11),
+        (0b1110, 0x11),
+        (0b1001, 0x11),
+    ];
+    assert_eq!([5; 4].map(&mut ask), round);
+    assert_eq!(ask(5), (0b1111, 0x12));
+    // Its turn is over: others go first.
+    assert_eq!(ask(5), (0b1110, 0x11));
+    for _ in 0..20 {
+        assert_eq!(ask(4).1, 0x11, "lower addresses are asked, too");
+    }
+    assert_eq!(ask(5), (0b1111, 0x12));
 }
 
 #[test]

@@ -13,8 +13,6 @@ use super::port::IoPort;
 const EDGES: usize = 32;
 /// Time between two looks at words, in ms: a point has at most ten events in a second.
 const WORDS_MS: u32 = 100;
-/// Id of the event that edges were lost because too many waited. The state of each point follows.
-const EDGES_LOST: u16 = 1;
 
 /// The new level of a waiting edge. The index of the point is below it.
 const LEVEL: u8 = 1 << 7;
@@ -24,8 +22,12 @@ const LEVEL: u8 = 1 << 7;
 pub struct Events<const SLOTS: usize> {
     ports: [PortEvents; SLOTS],
     edges: Deque<u8, EDGES>,
+    /// Number of edges in front that the packet has.
+    edges_in_packet: u8,
     /// Edges were lost.
     lost: bool,
+    /// The packet says that edges were lost.
+    lost_in_packet: bool,
     /// The start is reported.
     started: bool,
 }
@@ -37,6 +39,8 @@ struct PortEvents {
     high: u8,
     /// The state is to be reported.
     due: u8,
+    /// The packet has the state.
+    in_packet: u8,
     /// Values as last reported.
     reported: [u16; CHANNELS],
 }
@@ -47,7 +51,9 @@ impl<const SLOTS: usize> Events<SLOTS> {
         Self {
             ports: [PortEvents::default(); SLOTS],
             edges: Deque::new(),
+            edges_in_packet: 0,
             lost: false,
+            lost_in_packet: false,
             started: true,
         }
     }
@@ -102,11 +108,15 @@ impl<const SLOTS: usize> Events<SLOTS> {
         }
         if !on {
             // Edges of this point that wait are no longer reported.
-            for _ in 0..self.edges.len() {
-                if let Some(edge) = self.edges.pop_front()
-                    && usize::from(edge & !LEVEL) != index
-                {
+            let in_packet = usize::from(self.edges_in_packet);
+            for n in 0..self.edges.len() {
+                let Some(edge) = self.edges.pop_front() else {
+                    break;
+                };
+                if usize::from(edge & !LEVEL) != index {
                     let _ = self.edges.push_back(edge);
+                } else if n < in_packet {
+                    self.edges_in_packet -= 1;
                 }
             }
         }
@@ -115,20 +125,22 @@ impl<const SLOTS: usize> Events<SLOTS> {
             (&mut own.on, on),
             (&mut own.due, on),
             (&mut own.high, to == Setting::High),
+            (&mut own.in_packet, false),
         ] {
             *set = *set & !bit | if on { bit } else { 0 };
         }
         on
     }
 
-    /// Returns what waits.
+    /// Returns what waits, and what a packet has that was not on the line yet.
     #[inline(never)]
     pub fn waiting(&self) -> Waiting {
-        let mut count = self.edges.len() + usize::from(self.lost);
+        let mut count = self.edges.len() + usize::from(self.lost || self.lost_in_packet);
         let mut is_high = false;
         for port in &self.ports {
-            count += port.due.count_ones() as usize;
-            is_high |= port.due & port.high != 0;
+            let waits = port.due | port.in_packet;
+            count += waits.count_ones() as usize;
+            is_high |= waits & port.high != 0;
         }
         for edge in &self.edges {
             let index = usize::from(edge & !LEVEL);
@@ -147,21 +159,32 @@ impl<const SLOTS: usize> Events<SLOTS> {
         self.started
     }
 
-    /// Moves events into a packet: first the edges, in order, then the states of points.
+    /// The master knows of the start.
+    pub const fn start_is_known(&mut self) {
+        self.started = false;
+    }
+
+    /// Adds events to a packet: first the edges, in order, then the states of points. What an earlier packet has waits again
+    /// before.
     #[inline(never)]
     pub fn fill(&mut self, packet: &mut Packet, ports: &[IoPort], first: u16) {
-        while let Some(edge) = self.edges.front() {
+        self.edges_in_packet = 0;
+        self.lost |= core::mem::take(&mut self.lost_in_packet);
+        for own in &mut self.ports {
+            own.due |= core::mem::take(&mut own.in_packet);
+        }
+        for edge in &self.edges {
             let id = first.wrapping_add((edge & !LEVEL).into());
             if !packet.push(EventKind::DiscreteInput, id, (edge >> 7).into()) {
                 return;
             }
-            self.edges.pop_front();
+            self.edges_in_packet += 1;
         }
         if self.lost {
-            if !packet.push(EventKind::Unit, EDGES_LOST, 0) {
+            if !packet.push(EventKind::Lost, 0, 0) {
                 return;
             }
-            self.lost = false;
+            (self.lost, self.lost_in_packet) = (false, true);
             self.ports.iter_mut().for_each(|port| port.due = port.on);
         }
         let mut id = first;
@@ -176,10 +199,23 @@ impl<const SLOTS: usize> Events<SLOTS> {
                         return;
                     }
                     own.due &= !bit;
+                    own.in_packet |= bit;
                     *reported = value;
                 }
                 id = id.wrapping_add(1);
             }
+        }
+    }
+
+    /// The packet that was filled last has been on the line.
+    #[inline(never)]
+    pub fn sent(&mut self) {
+        for _ in 0..core::mem::take(&mut self.edges_in_packet) {
+            self.edges.pop_front();
+        }
+        self.lost_in_packet = false;
+        for own in &mut self.ports {
+            own.in_packet = 0;
         }
     }
 }

@@ -620,8 +620,16 @@ impl<const SLOTS: usize> EventSource for Device<SLOTS> {
         self.events.reports_start()
     }
 
+    fn start_is_known(&mut self) {
+        self.events.start_is_known();
+    }
+
     fn fill(&mut self, packet: &mut Packet) {
         let first = self.points.first_of(0);
         self.events.fill(packet, self.points.ports(), first);
+    }
+
+    fn sent(&mut self) {
+        self.events.sent();
     }
 }

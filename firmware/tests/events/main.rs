@@ -76,3 +76,37 @@ fn no_edge_is_lost_with_bit_errors_and_units_that_restart() {
         assert!(latencies.len() as f64 > 0.8 * per_s * seconds());
     }
 }
+
+/// Returns the longest time from an edge until the master knows it, in s.
+fn longest(master: &mut Master, edges_per_s: f64) -> f64 {
+    let traffic = Traffic {
+        edges_per_s,
+        restarts_per_s: 0.0,
+        seconds: seconds(),
+    };
+    let latencies = master.run(&traffic);
+    assert!(latencies.len() as f64 > 0.3 * edges_per_s * seconds());
+    latencies.into_iter().fold(0.0, f64::max) / 1e6
+}
+
+#[test]
+fn unit_that_nobody_has_set_up_keeps_no_other_one_waiting() {
+    for baud in [9_600, 115_200] {
+        let mut master = Master::keeping_address(baud);
+        master.restart_second();
+        let longest = longest(&mut master, 2.0);
+        // Five fetches of one packet each; with the start in each packet of the second unit it would be 2,500 bits.
+        let bits = longest * f64::from(baud);
+        assert!(bits < 1_500.0, "{baud}: {longest} s");
+    }
+}
+
+#[test]
+fn input_at_50_hz_keeps_no_other_unit_waiting_for_a_second() {
+    for baud in [9_600, 115_200] {
+        let mut master = Master::keeping_address(baud);
+        master.bounce_second(seconds() + 5.0);
+        let longest = longest(&mut master, 2.0);
+        assert!(longest < 1.0, "{baud}: {longest} s");
+    }
+}

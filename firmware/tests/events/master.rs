@@ -30,6 +30,8 @@ struct Known {
     restarted: bool,
     /// Inputs whose states are reported next.
     states: u8,
+    /// Its events are not checked.
+    is_unchecked: bool,
 }
 
 pub struct Master {
@@ -37,6 +39,9 @@ pub struct Master {
     known: Vec<Known>,
     /// Address and flag to be confirmed.
     confirms: (u8, u8),
+    /// Ask from the last address that had events on until there are none, as wb-mqtt-serial does. Otherwise ask all.
+    keeps_address: bool,
+    least: u8,
 }
 
 impl Master {
@@ -46,6 +51,8 @@ impl Master {
             bus: Bus::new(baud, units, errors, seed),
             known: (0..units).map(|_| Known::default()).collect(),
             confirms: (0, 0),
+            keeps_address: false,
+            least: 0,
         };
         for n in 0..units.into() {
             master.switch_on(n);
@@ -53,6 +60,29 @@ impl Master {
         // The states of the inputs.
         while master.fetch(&mut Vec::new()) {}
         master
+    }
+
+    /// Returns a master that keeps the last address that had events, and two units. Nothing is checked of the second one,
+    /// which has the greater address.
+    pub fn keeping_address(baud: u32) -> Self {
+        let mut master = Self::new(baud, 2, 0.0, 3);
+        master.keeps_address = true;
+        master.known[1].is_unchecked = true;
+        master
+    }
+
+    /// Starts the second unit again. Nobody sets it up.
+    pub fn restart_second(&mut self) {
+        let now = self.bus.now;
+        self.bus.units[1].restart(now, START_US);
+    }
+
+    /// Lets the first input of the second unit change every 10 ms from now on, for these seconds.
+    pub fn bounce_second(&mut self, seconds: f64) {
+        for n in 0..(seconds * 100.0) as u32 {
+            let at = self.bus.now + f64::from(n) * 10_000.0;
+            self.bus.units[1].change(at, 0, n % 2 == 0);
+        }
     }
 
     /// Switches the events of a unit's inputs on, and the report of its start off.
@@ -77,15 +107,19 @@ impl Master {
     /// Fetches events once. Adds their latencies in us. Returns whether there were any.
     fn fetch(&mut self, latencies: &mut Vec<f64>) -> bool {
         let (address, flag) = self.confirms;
-        let request = frame(&[0xFD, 0x46, 0x10, 0, 100, address, flag]);
+        let request = frame(&[0xFD, 0x46, 0x10, self.least, 100, address, flag]);
         let reply = self.bus.ask(&request, true);
         let Some(body) = body(&reply) else {
             return true;
         };
         let [unit, 0x46, 0x11, flag, _, len, events @ ..] = body else {
             assert_eq!(body, [0xFD, 0x46, 0x12]);
+            self.least = 0;
             return false;
         };
+        if self.keeps_address {
+            self.least = *unit;
+        }
         assert_eq!(usize::from(*len), events.len());
         self.confirms = (*unit, *flag);
         let n = self
@@ -98,6 +132,9 @@ impl Master {
             return true;
         }
         self.known[n].packet = body.to_vec();
+        if self.known[n].is_unchecked {
+            return true;
+        }
         self.take(n, events, latencies);
         true
     }
@@ -170,7 +207,8 @@ impl Master {
     fn edge(&mut self, at: f64) {
         let n = self.bus.rng.random_range(0..self.bus.units.len());
         // Edges while a unit starts are lost, and those up to the report of its states are part of these.
-        if self.known[n].restarted || self.known[n].states != 0 {
+        let known = &self.known[n];
+        if known.restarted || known.states != 0 || known.is_unchecked {
             return;
         }
         let input = self.bus.rng.random_range(0..4);

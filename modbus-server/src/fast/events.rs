@@ -14,8 +14,12 @@ pub enum Kind {
     HoldingRegister = 3,
     /// An input register has changed. The data is its value, low byte first.
     InputRegister = 4,
-    /// The unit itself, without a value: id 0, it has started; other ids are the device's own.
+    /// The unit itself has started, without a value. The id is [`Kind::STARTED`].
     Unit = 0x0F,
+    /// Edges were lost, because more waited than the unit has room for, without a value. The id is 0. The extension does
+    /// not have this kind: a client passes over kinds that it does not know, but takes every event of kind
+    /// [`Unit`](Self::Unit) for a start.
+    Lost = 0x80,
 }
 
 impl Kind {
@@ -37,16 +41,25 @@ pub trait EventSource {
     /// Returns what waits.
     fn waiting(&self) -> Waiting;
 
-    /// Returns whether the event "the unit has started" heads every packet: from the start until a master switches it off
-    /// (sub-function 18, kind [`Kind::Unit`], id [`Kind::STARTED`]).
+    /// Returns whether the event "the unit has started" heads every packet: from the start until
+    /// [`start_is_known`](Self::start_is_known), or until a master switches it off (sub-function 18, kind [`Kind::Unit`],
+    /// id [`Kind::STARTED`]).
     fn reports_start(&self) -> bool;
 
-    /// Moves the oldest events into `packet`, until there is no more [room](Packet::push). They are reported from then
-    /// on; the packet keeps them until the master has them.
+    /// The master knows that the unit has started: two packets in a row that said so were confirmed. The first confirmation
+    /// may be one from before the start, whose flag fits by chance.
+    fn start_is_known(&mut self);
+
+    /// Adds the oldest events to `packet`, until there is no more [room](Packet::push). They wait until
+    /// [`sent`](Self::sent); the next call begins with them again.
     fn fill(&mut self, packet: &mut Packet);
+
+    /// The packet that was filled last has been on the line: its events no longer wait.
+    fn sent(&mut self);
 }
 
-/// Events that were reported together. They are sent again, without any change, until the master confirms them.
+/// Events that are reported together. Once they were on the line, they are sent again, without any change, until the
+/// master confirms them. Before that the packet is made again for each fetch.
 #[derive(Debug)]
 pub struct Packet {
     bytes: [u8; Packet::CAPACITY],
@@ -59,6 +72,8 @@ pub struct Packet {
     pub(super) is_high: bool,
     /// The unit has won an arbitration with it. Before that no master can have it.
     pub(super) was_sent: bool,
+    /// Its events no longer wait in the device.
+    pub(super) was_taken: bool,
 }
 
 impl Packet {
@@ -71,9 +86,10 @@ impl Packet {
             len: 0,
             room: 0,
             number: 0,
-            flag: 1,
+            flag: 0,
             is_high: false,
             was_sent: false,
+            was_taken: false,
         }
     }
 
@@ -82,19 +98,24 @@ impl Packet {
         self.len == 0
     }
 
+    /// Returns whether its first event is that the unit has started.
+    pub(super) fn has_start(&self) -> bool {
+        !self.is_empty() && self.bytes.get(1) == Some(&(Kind::Unit as u8))
+    }
+
     /// Empties it, and allows at most `room` bytes.
     pub(super) fn clear(&mut self, room: u8) {
         self.len = 0;
         self.room = room.min(Self::CAPACITY as u8);
         self.number = 0;
-        self.was_sent = false;
+        (self.was_sent, self.was_taken) = (false, false);
     }
 
     /// Adds an event with its value. Returns `false` and changes nothing when there is no room.
     pub fn push(&mut self, kind: Kind, id: u16, value: u16) -> bool {
         let ([high, low], [first, second]) = (id.to_be_bytes(), value.to_le_bytes());
         let len = match kind {
-            Kind::Unit => 0,
+            Kind::Unit | Kind::Lost => 0,
             Kind::Coil | Kind::DiscreteInput => 1,
             Kind::HoldingRegister | Kind::InputRegister => 2,
         };
@@ -113,9 +134,11 @@ impl Packet {
         true
     }
 
-    /// Appends flag, number of events, length and events.
+    /// Appends flag, number of events, length and events. A packet without events has the flag of the one before, so that
+    /// its confirmation is none of the next.
     pub(super) fn append_to(&self, adu: &mut Adu) {
-        adu.extend(&[self.flag, self.number, self.len]);
+        let flag = self.flag ^ u8::from(self.is_empty());
+        adu.extend(&[flag, self.number, self.len]);
         adu.extend(self.bytes.get(..self.len.into()).unwrap_or_default());
     }
 }

@@ -1,6 +1,6 @@
 //! A unit's part in scans and in the reports of events.
 
-use super::{ADDRESS, EventSource, FUNCTION, Kind, Packet, SERIAL_AHEAD, sub};
+use super::{ADDRESS, EventSource, FUNCTION, Kind, Packet, SERIAL_AHEAD, Waiting, sub};
 use crate::line::Ending;
 use crate::server::refuse;
 use crate::{Adu, Exception, Function, Outcome, Reply, Request, Server};
@@ -18,6 +18,11 @@ const NO_EVENTS: u32 = 0b1111 << 8;
 const ADDRESS_BITS: u8 = 8;
 /// Number of packets in a row after which others go first.
 const IN_A_ROW: u8 = 2;
+/// Number of packets in a row after which a unit that is the least one asked says once that there are no events. Some
+/// masters begin again with the least address only when they hear that.
+const BEFORE_NONE: u8 = 4;
+/// Number of confirmed packets in a row with the start, after which the master knows of it.
+const STARTS: u8 = 2;
 /// Largest number of words that function 17 can return inside sub-function 09: 256 bytes less 7 in front, 2 of function
 /// and byte count, and 2 of the CRC are 245.
 const MAX_WORDS: u16 = 122;
@@ -42,8 +47,12 @@ pub struct Unit {
     address: u8,
     part: Part,
     is_found: bool,
-    /// Number of packets that were sent in a row.
+    /// Number of packets that were sent in a row, since others went first.
     in_a_row: u8,
+    /// Number of packets that were sent in a row, since there were no events.
+    since_none: u8,
+    /// Number of packets with the start that were confirmed in a row.
+    starts: u8,
     packet: Packet,
     /// What the reply means that was sent if the unit has won.
     contended: Contended,
@@ -76,6 +85,8 @@ impl Unit {
             part,
             is_found: false,
             in_a_row: 0,
+            since_none: 0,
+            starts: 0,
             packet: Packet::new(),
             contended: Contended::Nothing,
         }
@@ -141,11 +152,16 @@ impl Unit {
         match (contended, ending) {
             (Contended::ToBeFound, Ending::Won) => self.is_found = true,
             (Contended::Packet, Ending::Won) => {
-                self.packet.was_sent = true;
+                // One without room for any event is made again.
+                self.packet.was_sent = !self.packet.is_empty();
+                self.since_none = self.since_none.saturating_add(1);
                 self.in_a_row = if yields { 1 } else { self.in_a_row + 1 };
             }
-            (Contended::Packet, Ending::Lost(left)) if !yields || left < ADDRESS_BITS => {
-                self.in_a_row = 0;
+            (Contended::Packet, Ending::Lost(left)) => {
+                self.since_none = 0;
+                if !yields || left < ADDRESS_BITS {
+                    self.in_a_row = 0;
+                }
             }
             _ => {}
         }
@@ -172,32 +188,31 @@ impl Unit {
     /// Makes a request for events the reply. Returns `None` if the unit is not asked.
     fn fetch(&mut self, adu: &mut Adu, source: &mut impl EventSource) -> Option<Contest> {
         let (least, room, confirmed, flag) = (adu.get(3), adu.get(4), adu.get(5), adu.get(6));
+        if self.packet.was_sent && !self.packet.was_taken {
+            source.sent();
+            self.packet.was_taken = true;
+        }
         if confirmed == self.address && flag == self.packet.flag && self.packet.was_sent {
-            self.packet.clear(0);
+            self.confirm(source);
         }
         if self.address < least {
             return None;
         }
-        let waiting = source.waiting();
-        let has_events = waiting.count > 0 || source.reports_start() || !self.packet.is_empty();
         adu.truncate(2);
-        if !has_events {
+        let waiting = source.waiting();
+        let has_events = waiting.count > 0 || source.reports_start() || self.packet.was_sent;
+        let others_wait = least == self.address && self.since_none >= BEFORE_NONE;
+        if !has_events || others_wait {
             adu.extend(&[sub::NO_EVENTS]);
-            self.in_a_row = 0;
+            self.since_none = 0;
+            if !has_events {
+                self.in_a_row = 0;
+            }
             return Some(self.contest(NO_EVENTS));
         }
-        let is_high = waiting.is_high || self.packet.is_high && !self.packet.is_empty();
-        if self.packet.is_empty() {
-            self.packet.clear(room);
-            self.packet.is_high = waiting.is_high;
-            if source.reports_start() {
-                self.packet.push(Kind::Unit, Kind::STARTED, 0);
-            }
-            source.fill(&mut self.packet);
-            self.packet.number = self.packet.number.saturating_add(source.waiting().count);
-            if !self.packet.is_empty() {
-                self.packet.flag ^= 1;
-            }
+        let is_high = waiting.is_high || self.packet.is_high && self.packet.was_sent;
+        if !self.packet.was_sent {
+            self.make_packet(room, waiting, source);
         }
         adu.set(0, self.address);
         adu.extend(&[sub::EVENTS]);
@@ -211,6 +226,34 @@ impl Unit {
             LOW
         };
         Some(self.contest(priority))
+    }
+
+    /// Makes the packet, with this room, from what waits now.
+    fn make_packet(&mut self, room: u8, waiting: Waiting, source: &mut impl EventSource) {
+        self.packet.clear(room);
+        self.packet.is_high = waiting.is_high;
+        if source.reports_start() {
+            self.packet.push(Kind::Unit, Kind::STARTED, 0);
+        }
+        let own = self.packet.number;
+        source.fill(&mut self.packet);
+        // More wait now if edges were lost.
+        self.packet.number = own.saturating_add(source.waiting().count);
+    }
+
+    /// The master has the packet.
+    fn confirm(&mut self, source: &mut impl EventSource) {
+        self.starts = if self.packet.has_start() {
+            self.starts + 1
+        } else {
+            0
+        };
+        if self.starts == STARTS {
+            self.starts = 0;
+            source.start_is_known();
+        }
+        self.packet.clear(0);
+        self.packet.flag ^= 1;
     }
 
     fn contest(&self, priority: u32) -> Contest {

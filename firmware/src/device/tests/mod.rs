@@ -2,8 +2,8 @@
 
 extern crate std;
 
-mod deadband;
 mod edges;
+mod events;
 mod files;
 mod keeping;
 mod links;

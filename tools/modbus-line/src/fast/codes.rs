@@ -36,4 +36,6 @@ pub mod kind {
     pub const INPUT_REGISTER: u8 = 4;
     /// The unit itself: id 0, it has started. Other ids are the maker's own.
     pub const UNIT: u8 = 0x0F;
+    /// Of a modio, id 0: edges were lost.
+    pub const LOST: u8 = 0x80;
 }

@@ -84,7 +84,7 @@ class Events(OnPage):
         frames = [frame(edge), frame(edge), frame(packet(2, "0102000201")), frame(edge, direction="rx"),
                   frame(packet(1, "0102000301"), crc_ok=False), frame(packet(1, "0102000301"), damaged=True),
                   frame("01030200000000"), frame(packet(1, "000f0000" "020400083412" "0203000cff00" "01010004" "00")),
-                  frame(packet(1, "000f0001")), frame(packet(1, "0107000501"))]
+                  frame(packet(1, "00800000")), frame(packet(1, "0107000501"))]
         words = self.page.evaluate("""async (frames) => {
             const events = await import("/events.js");
             events.reset();

@@ -17,8 +17,6 @@ use crate::value::{Shown, show, text};
 
 /// Id of the event of a unit that has started.
 const STARTED: u16 = 0;
-/// Id of the event of a modio that edges were lost.
-const EDGES_LOST: u16 = 1;
 /// Most points of one request to switch events on.
 const MOST: usize = 40;
 /// Number of requests without a reply after which the line counts as lost.
@@ -232,7 +230,7 @@ fn told(event: &Event, points: Option<&Vec<(u8, Item)>>) -> (String, Shown) {
     };
     let table = match (event.kind, event.id) {
         (kind::UNIT, STARTED) => return ("started".to_owned(), nothing()),
-        (kind::UNIT, EDGES_LOST) => return ("edges lost".to_owned(), nothing()),
+        (kind::LOST, _) => return ("edges lost".to_owned(), nothing()),
         (kind::COIL, _) => "coil",
         (kind::DISCRETE_INPUT, _) => "discrete input",
         (kind::HOLDING_REGISTER, _) => "holding register",
@@ -302,7 +300,8 @@ mod tests {
             ),
             (7, 1, &long, "event 1 650777868590383874"),
             (kind::UNIT, 0, &[], "started"),
-            (kind::UNIT, 1, &[], "edges lost"),
+            (kind::LOST, 0, &[], "edges lost"),
+            (kind::UNIT, 1, &[], "event 1 0"),
         ] {
             assert_eq!(told_of(kind, id, data), text);
         }

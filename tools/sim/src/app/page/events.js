@@ -9,11 +9,10 @@ const EVENTS = 0x11;
 /** Bytes of a packet in front of its events: unit address, function, sub-function, flag, number and length. */
 const HEAD = 6;
 const CRC = 2;
-/** Kinds of events: a coil, a discrete input, a holding register, an input register, the unit itself. */
+/** Kinds of events: a coil, a discrete input, a holding register, an input register; the unit has started, edges were lost. */
 const BITS = [1, 2];
 const WORDS = [3, 4];
-const UNIT = 0x0f;
-const OF_UNIT = ["started", "edges lost"];
+const OF_UNIT = { 0x0f: "started", 0x80: "edges lost" };
 
 /** The last events, oldest first: time in ms, address of the point, value, and words. */
 let events = [];
@@ -55,5 +54,5 @@ function decode(bytes) {
 function meaning(kind, id, value) {
   if (BITS.includes(kind)) return { point: id, value, words: `${nameOf(id)} ${value === 0 ? "off" : "on"}` };
   if (WORDS.includes(kind)) return { point: id, value, words: `${nameOf(id)} ${value}` };
-  return { words: (kind === UNIT && OF_UNIT[id]) || `event ${id} ${value}` };
+  return { words: (id === 0 && OF_UNIT[kind]) || `event ${id} ${value}` };
 }

@@ -1,4 +1,4 @@
-//! Which changes of an analog input are events.
+//! Events of function 70: which changes are events, and what a packet has that lost its arbitration.
 
 use modbus_server::fast::{EventSource, Part, Setting, Unit};
 use modbus_server::line::FastUnit;
@@ -36,6 +36,12 @@ fn is_event(bench: &mut Bench<4>, value: u16) -> bool {
 
 /// Lets the unit report its events.
 fn fetch(bench: &mut Bench<4>) {
+    packet(bench);
+    bench.device.sent();
+}
+
+/// Returns number, length and events of a packet that loses its arbitration.
+fn packet(bench: &mut Bench<4>) -> std::vec::Vec<u8> {
     let units = FastUnit {
         unit: 1,
         is_fast: true,
@@ -52,6 +58,10 @@ fn fetch(bench: &mut Bench<4>) {
     let mut unit = Unit::new(1, 1, Part::Everything);
     let (reply, _) = (bench.server).serve_fast(request, &mut unit, bench.device);
     port.send(reply, 0);
+    let mut bytes = std::vec![port.start().unwrap()];
+    bytes.extend(core::iter::from_fn(|| port.next_byte()));
+    // Behind address, function, sub-function and flag, in front of the CRC.
+    bytes.get(4..bytes.len() - 2).unwrap_or_default().to_vec()
 }
 
 #[test]
@@ -123,5 +133,75 @@ fn edge_of_an_input_that_was_switched_off_is_not_reported() {
             assert_eq!(bench.device.waiting().count, 1);
         }
     }
+    assert_eq!(bench.device.waiting().count, 0);
+}
+
+/// Returns a device that reports its first two digital inputs, and has reported that they are open.
+fn with_two_inputs() -> Bench<4> {
+    let mut bench = Bench::on(&MODIO_08, MODULES, &[]);
+    bench.scan(|channels| (0..2).for_each(|n| channels.set_bit(n, false)));
+    for input in 0..2 {
+        let device = &mut bench.device;
+        device
+            .events
+            .set(device.points.ports(), 0, 2, input, Setting::Low);
+    }
+    bench.device.start_is_known();
+    fetch(&mut bench);
+    bench
+}
+
+#[test]
+fn packet_that_loses_is_made_again_without_what_was_switched_off() {
+    let mut bench = with_two_inputs();
+    let [off, on] = [0, 1].map(|value| move |input| [1, 2, 0, input, value]);
+    bench.scan(|channels| channels.set_bit(0, true));
+    bench.scan(|channels| channels.set_bit(1, true));
+    assert_eq!(packet(&mut bench), [&[2, 10][..], &on(0), &on(1)].concat());
+    let device = &mut bench.device;
+    device
+        .events
+        .set(device.points.ports(), 0, 2, 0, Setting::Off);
+    assert_eq!(packet(&mut bench), [&[1, 5][..], &on(1)].concat());
+    // Edges while the unit arbitrates are not in the packet.
+    bench.scan(|channels| channels.set_bit(0, false));
+    bench.scan(|channels| channels.set_bit(1, false));
+    bench.device.sent();
+    assert_eq!(packet(&mut bench), [&[1, 5][..], &off(1)].concat());
+    // It is known only now that this packet was on the line, and the point was switched off since.
+    let device = &mut bench.device;
+    device
+        .events
+        .set(device.points.ports(), 0, 2, 1, Setting::Off);
+    device
+        .events
+        .set(device.points.ports(), 0, 2, 1, Setting::Low);
+    bench.device.sent();
+    assert_eq!(
+        packet(&mut bench),
+        [&[1, 5][..], &off(1)].concat(),
+        "its state"
+    );
+}
+
+#[test]
+fn states_follow_the_event_that_edges_were_lost() {
+    let mut bench = with_two_inputs();
+    for n in 0..33 {
+        bench.scan(|channels| channels.set_bit(0, n % 2 == 0));
+    }
+    assert_eq!(bench.device.waiting().count, 33);
+    // 12 of 32 edges have room in a packet.
+    for left in [33, 21] {
+        assert_eq!(packet(&mut bench)[..2], [left, 60]);
+        bench.device.sent();
+    }
+    let mut last: std::vec::Vec<u8> = std::vec![11, 54];
+    last.extend((0..8).flat_map(|n| [1, 2, 0, 0, 1 - n % 2]));
+    last.extend([0, 0x80, 0, 0, 1, 2, 0, 0, 1, 1, 2, 0, 1, 0]);
+    for _ in 0..2 {
+        assert_eq!(packet(&mut bench), last);
+    }
+    bench.device.sent();
     assert_eq!(bench.device.waiting().count, 0);
 }
