@@ -46,10 +46,11 @@ pub struct Line<U, G> {
     /// Times of an arbitration, and the end of the last request of Fast Modbus.
     windows: Windows,
     ended: Option<u32>,
-    /// Milliseconds that a reply may take, in case the timer does not limit it, and milliseconds that the present
-    /// one has taken.
+    /// Milliseconds that a reply may take, in case the timer does not limit it.
     longest_ms: u16,
-    sending_ms: u16,
+    /// Milliseconds since the last request has ended, or its reply has begun. Unlike the times of an arbitration, this
+    /// count does not wrap while a task waits for an erase of flash.
+    passed_ms: u16,
     /// An event of the timer was pending in the last millisecond, and its interrupt has not run since.
     is_pending: bool,
     /// The line was set up again since the last millisecond.
@@ -74,7 +75,7 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
             windows,
             ended: None,
             longest_ms,
-            sending_ms: 0,
+            passed_ms: 0,
             is_pending: false,
             repaired: false,
         }
@@ -127,6 +128,7 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         let waits = self.port.ends_fast_message(now_ms);
         if waits {
             self.ended = Some(self.gap.end_of(character));
+            self.passed_ms = 0;
         }
         self.gap.restart();
         waits
@@ -144,6 +146,7 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         };
         if HAS_EVENTS && waits {
             self.ended = None;
+            self.passed_ms = 0;
         }
         waits
     }
@@ -157,7 +160,7 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
     /// that is pending in two milliseconds, while its interrupt has not run, is not going to be handled.
     fn is_sound(&mut self) -> bool {
         if self.is_sending() {
-            return self.sending_ms < self.longest_ms;
+            return self.passed_ms < self.longest_ms;
         }
         if !self.uart.driver_is_off() {
             return false;
@@ -216,21 +219,29 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         }
     }
 
-    /// Takes part in an arbitration, and sends the reply if this unit wins it.
+    /// Takes part in an arbitration, and sends the reply if this unit wins it. A request that is served too late for its
+    /// first window has no reply.
     pub fn arbitrate(&mut self, reply: Reply<'static>, contest: Contest) {
         // A request with a function of unknown length inside has ended with a silence.
-        let ended = self.ended.take().unwrap_or_else(|| self.gap.now());
+        let ended = self.ended.unwrap_or_else(|| self.gap.now());
         let Contest { value, windows } = contest;
         let arbitration = Arbitration::new(value, windows, ended, self.windows);
         self.port.arbitrate(reply, arbitration);
-        self.sending_ms = 0;
-        self.wait_for_turn();
+        // Otherwise the times are those of a request that has come since.
+        if self.port.is_arbitrating() {
+            self.ended = None;
+            // The count is up to 1 ms more than what has passed.
+            if core::mem::take(&mut self.passed_ms) > self.windows.start_ms + 1 {
+                self.port.withdraw();
+            }
+            self.wait_for_turn();
+        }
     }
 
     /// Runs once per millisecond: advances the response delay and, when `checks`, repairs a line that does not work.
     /// Returns whether the line was set up again since the last call.
     pub fn on_millisecond(&mut self, checks: bool) -> bool {
-        self.sending_ms = self.sending_ms.saturating_add(1);
+        self.passed_ms = self.passed_ms.saturating_add(1);
         if checks && !self.is_sound() {
             self.repair();
         }
@@ -251,7 +262,7 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
     #[inline(always)]
     fn begin(&mut self, first: u8) {
         self.gap.stop();
-        self.sending_ms = 0;
+        self.passed_ms = 0;
         self.uart.start_sending(first);
         self.gap.limit_sending();
     }

@@ -6,6 +6,7 @@ use std::boxed::Box;
 use std::vec::Vec;
 
 use board_support::line::{Alarms, Character};
+use modbus_server::fast::{self, EventSource, Packet, Waiting};
 use modbus_server::line::{Framing, Receiver};
 use modbus_server::{Adu, Server, Tables};
 
@@ -185,6 +186,7 @@ const REPLY: [u8; 7] = [0x11, 0x03, 0x02, 0x11, 0x11, 0xB5, 0xDB];
 const LONGEST_MS: u16 = 20;
 const WINDOWS: Windows = Windows {
     start: 1_000,
+    start_ms: 0,
     length: 100,
     guard: 10,
 };
@@ -339,4 +341,71 @@ fn interrupt_without_a_cause_is_disabled() {
     assert!(!bench.line.on_uart(|| 0));
     assert!(!bench.line.uart.others);
     assert!(bench.pass(1), "it is a repair");
+}
+
+#[test]
+fn unit_that_serves_a_request_too_late_for_its_first_window_is_silent() {
+    for (late_ms, takes_part) in [(0, true), (1, true), (2, false), (400, false)] {
+        let mut bench = Bench::new();
+        // Continue a scan.
+        for (n, byte) in [0xFD, 0x46, 2, 0x53, 0x91].into_iter().enumerate() {
+            bench.line.uart.waiting = Some(byte);
+            assert_eq!(bench.line.on_uart(|| 0), n == 4);
+        }
+        bench.pass(late_ms);
+        // The timer has wrapped, and does not show it.
+        bench.line.gap.now = 500;
+        let mut request = bench.line.take().expect("a request waits");
+        let mut unit = fast::Unit::new(1, 17, fast::Part::Everything);
+        assert!(!unit.open(&mut request));
+        let (reply, contest) = bench.server.serve_fast(request, &mut unit, &mut NoEvents);
+        bench.line.arbitrate(reply, contest);
+        assert_eq!(bench.line.is_replying(), takes_part, "{late_ms} ms");
+    }
+}
+
+#[test]
+fn request_that_comes_while_another_one_is_served_keeps_its_own_time() {
+    let mut bench = Bench::new();
+    let mut unit = fast::Unit::new(1, 17, fast::Part::Everything);
+    let scan = |bench: &mut Bench, ended: u32| {
+        bench.line.gap.now = ended;
+        for byte in [0xFD, 0x46, 2, 0x53, 0x91] {
+            bench.line.uart.waiting = Some(byte);
+            bench.line.on_uart(|| 0);
+        }
+    };
+    scan(&mut bench, 0);
+    let mut serve = |bench: &mut Bench, meanwhile: Option<u32>| {
+        let mut request = bench.line.take().expect("a request waits");
+        if let Some(ended) = meanwhile {
+            scan(bench, ended);
+        }
+        assert!(!unit.open(&mut request));
+        let (reply, contest) = bench.server.serve_fast(request, &mut unit, &mut NoEvents);
+        bench.line.arbitrate(reply, contest);
+    };
+    serve(&mut bench, Some(5_000));
+    assert!(!bench.line.is_replying());
+    bench.line.gap.now = 5_300;
+    serve(&mut bench, None);
+    assert!(bench.line.is_replying());
+    let first = 5_000 + WINDOWS.start;
+    let wake = bench.line.gap.wake;
+    assert!((first..=first + WINDOWS.length).contains(&wake), "{wake}");
+}
+
+/// A device without events.
+struct NoEvents;
+
+impl EventSource for NoEvents {
+    fn waiting(&self) -> Waiting {
+        Waiting::default()
+    }
+    fn reports_start(&self) -> bool {
+        false
+    }
+    fn start_is_known(&mut self) {}
+    fn fill(&mut self, _: &mut Packet) {}
+    fn sent(&mut self) {}
 }

@@ -18,12 +18,14 @@
 
 /// The times of an arbitration, in fractions of the caller's ticks: 65,536 to a tick.
 ///
-/// The whole arbitration must take less than half of the time after which the caller's count of ticks, which has 16 bits,
-/// starts again.
+/// Start and two windows must take less than half of the time after which the caller's count of ticks, which has 16 bits,
+/// starts again: only times of neighbouring windows are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Windows {
     /// From the end of the request to the first window.
     pub start: u32,
+    /// The same in whole milliseconds.
+    pub start_ms: u16,
     /// Length of a window.
     pub length: u32,
     /// How much earlier a window begins and ends for edges.
@@ -35,12 +37,15 @@ impl Windows {
     /// max(13 bits, 12 bits + 50 us rounded up to whole bits), guard max(24 us, a quarter of a bit). A character counts as
     /// 11 bits, whatever its format.
     ///
-    /// `bit` must not be 0.
+    /// Neither may be 0.
     #[must_use]
     pub fn new(bit: u32, us: u32) -> Self {
         let length = 12 + (50 * us).div_ceil(bit.max(1));
+        let start = (38 * bit + bit / 2).max(12 * bit + 800 * us);
         Self {
-            start: (38 * bit + bit / 2).max(12 * bit + 800 * us),
+            start,
+            // Below 100.
+            start_ms: (start / (1_000 * us).max(1)) as u16,
             length: length.max(13) * bit,
             guard: (24 * us).max(bit / 4),
         }

@@ -37,7 +37,8 @@ impl Master {
         let window = bits(13) + Time::from_us(50);
         let start = bits(39).max(bits(12) + Time::from_us(800));
         let arbitration = start + Time::from_ps(window.as_ps() * windows);
-        let reply = self.settings.characters(72) + Time::from_ms(2);
+        // A reply to a request to a unit's own address has t3.5 in front of it and behind it.
+        let reply = self.settings.characters(72 + 8) + Time::from_ms(4);
         self.bus.run_until(end + arbitration + reply);
         let received = self.bus.line().take_received();
         let bytes: Vec<u8> = received.iter().map(|received| received.byte).collect();

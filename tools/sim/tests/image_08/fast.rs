@@ -1,11 +1,12 @@
 //! Function 70 on a bus: units arbitrate with real start bits, different crystals and late interrupts.
 
 use register_map::codes::Baud;
-use register_map::configuration::{BAUD, FORMAT};
+use register_map::configuration::{BAUD, FILTER, FORMAT};
 use sim::{Board, Config, Module, Time};
 
 use crate::bench::{self, FIRST, PORT, config, corner};
 use crate::fast_master::Master;
+use crate::saving::{SLOWEST, large};
 
 /// A unit: its switch and the error of its crystal in ppm; `None` without a crystal.
 type Unit = (u8, Option<i32>);
@@ -159,5 +160,55 @@ fn events_come_from_the_unit_that_has_them_high_ones_first() {
                 assert_eq!(reply, [unit, 4, 2, 0, 0], "{baud:?} {counter:02X}");
             }
         }
+    }
+}
+
+/// A unit serves a fetch that it has received during an erase of flash only after it. By then another unit may be asked.
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn unit_that_erases_flash_during_a_fetch_speaks_into_no_later_answer() {
+    for baud in [Baud::B115200, Baud::B921600] {
+        let stored = [&large()[..], &[(BAUD, baud.code())]].concat();
+        let boards = [(1, Some(0)), (2, Some(0))];
+        let boards = boards
+            .iter()
+            .zip(0..)
+            .map(|(unit, n)| board(*unit, n, &stored));
+        let mut master = Master::new(baud, 0, boards.collect());
+        master.bus.board_mut(0).set_flash_durations(SLOWEST);
+        for unit in [1, 2] {
+            switch_on(&mut master, unit, 1);
+        }
+        fetch_all(&mut master);
+        let mut erases = 0;
+        for n in 0..18 {
+            set_input(&mut master, 0, 2, n % 2 == 0);
+            master.bus.run_for(Time::from_ms(100));
+            for (register, value) in [(0x0100, 0x5A17), (FILTER, 10 + n), (0x0108, 1)] {
+                let [high, low] = u16::to_be_bytes(register);
+                let [first, second] = u16::to_be_bytes(value);
+                let request = [1, 6, high, low, first, second];
+                assert_eq!(master.ask(&request, 0).expect("a reply").0, request);
+            }
+            // Every second save erases a page after its record, when the watchdog was refreshed: the unit misses a fetch.
+            let last = master.bus.now() + Time::from_ms(200);
+            let mut served = true;
+            while served && master.bus.now() < last {
+                master
+                    .bus
+                    .run_for(Time::from_us(3_000 + 300 * u64::from(n)));
+                served = master.fetch(0, 0)[0] == 1;
+            }
+            let end = master.bus.now() + Time::from_ms(60);
+            while master.bus.now() < end {
+                let answer = master.ask(&[2, 2, 0, FIRST, 0, 4], 0);
+                assert_eq!(answer, Some((vec![2, 2, 1, 0], vec![])), "{baud:?} {n}");
+            }
+            erases += u32::from(!served);
+            // It is reported by the next fetch, or again.
+            let edge = (1, 2, u8::from(n % 2 == 0));
+            assert_eq!(fetch_all(&mut master), [edge], "{baud:?} {n}");
+        }
+        assert!(erases > 5, "{baud:?}: {erases}");
     }
 }
