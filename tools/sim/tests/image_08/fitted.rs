@@ -18,13 +18,24 @@ pub const LINES: [[(char, u8); 4]; 4] = [
 /// Returns a board with these modules in the slots of ports 1 to 4 and in its stored configuration, together with
 /// these settings.
 pub fn fitted(plugged: [Module; 4], settings: &[(u16, u16)]) -> Bench {
+    fitted_with(plugged, settings, |_| {})
+}
+
+/// The same, with changes in its flash.
+pub fn fitted_with(
+    plugged: [Module; 4],
+    settings: &[(u16, u16)],
+    change: impl FnOnce(&mut [u8]),
+) -> Bench {
     let slots: Vec<_> = (1..).zip(plugged).collect();
     let mut stored: Vec<_> = modules(slots.iter().copied()).collect();
     stored.extend(settings);
+    let mut flash = flash_with_settings(&stored);
+    change(&mut flash);
     Bench::with(Config {
         layout: LAYOUT,
         slots,
-        chip: sim::chip::Config::holding(flash_with_settings(&stored)),
+        chip: sim::chip::Config::holding(flash),
         ..Config::default()
     })
 }

@@ -1,13 +1,19 @@
 //! What a reset that is not a power-on keeps of the outputs: a reset after any store leaves the old values or the new ones,
 //! and those of another image do not count.
 
+use register_map::codes::Command;
 use register_map::codes::LinkAction;
-use register_map::configuration::{AS_IT_WAS, COMM_TIMEOUT, FILTER, START};
+use register_map::configuration::{AS_IT_WAS, COMM_TIMEOUT, COMMAND, FILTER, START};
 use register_map::links;
-use sim::{Module, Time};
+use register_map::part::FLASH_BASE;
+use register_map::state::{UPDATE, update};
+use register_map::update::{Reason, State, crc32};
+use sim::{Image, Module, Time};
 
-use crate::bench::{Bench, adu};
-use crate::fitted::{change, codes, fitted, outputs};
+use crate::LAYOUT;
+use crate::bench::{Bench, adu, file};
+use crate::fitted::{change, codes, fitted_with, outputs};
+use crate::in_slots::{APPLICATION, CHECK, runs_from, signed};
 
 const MODULES: [Module; 4] = [Module::Do4, Module::Di4, Module::Ao4, Module::None];
 /// An output with START = 0 that follows an input, and the input.
@@ -28,11 +34,16 @@ type Values = ([bool; 4], [u16; 2]);
 
 /// Returns a unit whose outputs start as they were, but for one that a link holds on.
 fn keeping() -> Bench {
+    keeping_with(|_| {})
+}
+
+/// The same, with changes in its flash.
+fn keeping_with(with: impl FnOnce(&mut [u8])) -> Bench {
     let mut stored = vec![(FILTER + INPUT, 0), (COMM_TIMEOUT, 0)];
     stored.extend([0, 1, 2, 8, 9].map(|point| (START + point, AS_IT_WAS)));
     let link = links::of_point(HEATER, false);
     stored.extend([(link, INPUT), (link + 1, LinkAction::Follow.code())]);
-    let mut bench = fitted(MODULES, &stored);
+    let mut bench = fitted_with(MODULES, &stored, with);
     bench.tolerant = true;
     change(&mut bench, 2, |slot| slot.set_energised(1, true)).unwrap();
     bench.board.run_for(Time::from_ms(1_200));
@@ -184,4 +195,47 @@ fn outputs_outlast_resets_within_the_first_second() {
     // A power-on brings nothing of it back but the record, which was not written.
     bench.power_cycle();
     assert_eq!(values(&bench), ([false; 4], [0; 2]));
+}
+
+/// Returns the image for slot B with an undefined instruction at the beginning of a handler.
+fn crashing(handler: &str) -> Vec<u8> {
+    let image = Image::read(&file("modio-b")).expect("the image can be read");
+    let address = image.symbol(handler).expect("it has the handler") & !1;
+    let code = LAYOUT.board.layout().slots[1] + APPLICATION as u32;
+    let at = APPLICATION + (address - code) as usize;
+    signed(1, |image| image[at..at + 2].copy_from_slice(&[0x00, 0xDE]))
+}
+
+/// Writes an image into slot B, and that it is confirmed, too, into the first record of the boot state.
+fn put_beside(flash: &mut [u8], image: &[u8]) {
+    let layout = LAYOUT.board.layout();
+    let slot = (layout.slots[1] - FLASH_BASE) as usize;
+    flash[slot..slot + image.len()].copy_from_slice(image);
+    let boot = (layout.boot.first - FLASH_BASE) as usize;
+    let record = &mut flash[boot..boot + 16];
+    // The states of both slots, 4 bits each.
+    record[5] |= record[5] << 4;
+    let crc = crc32([&record[..12], &[]]);
+    record[12..].copy_from_slice(&crc.to_le_bytes());
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn outputs_outlast_a_trial_image_that_crashes_at_each_start() {
+    // At its first instruction, in its first scan, and in its background, which comes later.
+    for handler in ["Reset", "EXTI1", "EXTI0"] {
+        let mut bench = keeping_with(|flash| put_beside(flash, &crashing(handler)));
+        write(&mut bench, [true, false, true], [1234, 77]);
+        let before = values(&bench);
+        let resets = bench.board.resets();
+        bench.configure(COMMAND, &[Command::GoBack.code()]);
+        bench.board.run_for(CHECK + Time::from_ms(2_000));
+        assert_eq!(runs_from(&mut bench), 0, "{handler}");
+        let other = bench.register(UPDATE) >> update::OTHER_SHIFT & 0b111;
+        let rejected = State::Rejected(Reason::NotConfirmed).code().0;
+        assert_eq!(other, u16::from(rejected), "{handler}");
+        // The order, and two starts on trial.
+        assert!(bench.board.resets() >= resets + 3, "{handler}");
+        assert_eq!(values(&bench), before, "{handler}");
+    }
 }
