@@ -47,8 +47,8 @@ pub const I2C_HALF_PERIOD_US: u32 = 6;
 /// Time limit for programming a half-word, in us: it takes at most 70 (DS5319 table 28).
 pub const FLASH_PROGRAM_US: u32 = 500;
 
-/// Time limit for erasing a page, in us: it takes at most 40 ms (DS5319 table 28).
-pub const FLASH_ERASE_US: u32 = 100_000;
+/// Time limit for erasing a page, in us: it takes at most 40 ms (DS5319 table 28), and up to 300 ms on clones of the part.
+pub const FLASH_ERASE_US: u32 = 420_000;
 
 /// Threshold of the voltage detector, PLS (RM0008 5.4.1). Level 7 is 2.9 V nominal: the detector reports a falling
 /// supply as low at 2.66 to 2.9 V and a rising one as sufficient at 2.76 to 3.0 V (DS5319 table 11).
@@ -93,15 +93,17 @@ pub const SCAN_HZ: u32 = 1_000;
 pub const LONGEST_WAIT_US: u32 = 10;
 
 /// Time-out of the independent watchdog, in milliseconds with an LSI of 40 kHz. The LSI runs at 30 to 60 kHz
-/// (DS5319 table 25), so the watchdog resets the device after 333 to 667 ms.
-pub const WATCHDOG_MS: u32 = 500;
+/// (DS5319 table 25), so the watchdog resets the device after 600 to 1,200 ms. One erase of 400 ms, and 100 ms until each task
+/// has proved that it runs, are less.
+pub const WATCHDOG_MS: u32 = 900;
 
-/// Time-out of the independent watchdog during start-up, in milliseconds with an LSI of 40 kHz: really 800 to 1600.
-/// Start-up takes at most 340: 150 for a crystal that does not start, 50 for the DIP switch, 120 for the store.
-pub const WATCHDOG_START_MS: u32 = 1_200;
+/// Time-out of the independent watchdog during start-up, in milliseconds with an LSI of 40 kHz: really 1,333 to 2,667.
+/// Start-up takes at most 1,040: 150 for a crystal that does not start, 50 for the DIP switch, 40 for a record of the store and
+/// 400 for each of two erases.
+pub const WATCHDOG_START_MS: u32 = 2_000;
 
-/// Divider of the watchdog's clock during start-up: steps of 0.4 ms.
-pub const WATCHDOG_START_DIVIDER: u32 = 16;
+/// Divider of the watchdog's clock during start-up: steps of 0.8 ms.
+pub const WATCHDOG_START_DIVIDER: u32 = 32;
 
 /// The watchdog's reload value during start-up.
 pub const WATCHDOG_START_RELOAD: u16 = (WATCHDOG_START_MS * 40 / WATCHDOG_START_DIVIDER - 1) as u16;
@@ -120,8 +122,8 @@ pub const WATCHDOG_LOADER_DIVIDER: u32 = 128;
 pub const WATCHDOG_LOADER_RELOAD: u16 =
     (WATCHDOG_LOADER_MS * 40 / WATCHDOG_LOADER_DIVIDER - 1) as u16;
 
-/// Divider of the watchdog's clock, the LSI (RM0008 19.4.2): steps of 0.2 ms.
-pub const WATCHDOG_DIVIDER: u32 = 8;
+/// Divider of the watchdog's clock, the LSI (RM0008 19.4.2): steps of 0.4 ms.
+pub const WATCHDOG_DIVIDER: u32 = 16;
 
 /// The watchdog's reload value (RM0008 19.4.3).
 pub const WATCHDOG_RELOAD: u16 = (WATCHDOG_MS * 40 / WATCHDOG_DIVIDER - 1) as u16;

@@ -1,14 +1,17 @@
 //! The flash, which holds the program and the pages that keep data without power (RM0008 3.3, PM0075 2.3).
 //!
-//! An operation stalls every read of flash: 40 to 70 us for a half-word, 20 to 40 ms for a page. Code in RAM
-//! continues. The operation is therefore started and polled from RAM, and only interrupts whose handlers are in RAM
+//! An operation stalls every read of flash: 40 to 70 us for a half-word, 20 to 40 ms for a page, up to 400 ms on clones of
+//! the part. Code in RAM continues. The operation is therefore started and polled from RAM, and only interrupts whose handlers are in RAM
 //! are enabled during it. Every operation unlocks the controller, checks what it reports, and locks it again even when
 //! the operation failed. The store checks that the flash reads back as written.
 //!
 //! Programming needs a supply of at least 2.0 V (DS5319 table 28). Every operation first reads the voltage
 //! detector, and does not begin while the supply is below its threshold ([`PVD_LEVEL`]).
 
-use core::{ptr, slice};
+use core::{
+    ptr, slice,
+    sync::atomic::{AtomicU8, Ordering},
+};
 
 use cortex_m::{
     asm,
@@ -27,11 +30,31 @@ const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 /// Error of a flash operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FlashError {
-    /// The supply is too low. Nothing was done; try again when the supply has recovered.
-    LowSupply,
+    /// The supply is too low, or the watchdog was not refreshed since the last erase. Nothing was done; try again later.
+    NotNow,
     /// The controller refused the operation, reported an error or did not end in time. The operation may or may not have
     /// taken effect.
     Failed,
+}
+
+/// Whether a page may be erased: always before [`watch_erases`], and then once for each [`allow_erase`].
+static ERASES: AtomicU8 = AtomicU8::new(UNWATCHED);
+const UNWATCHED: u8 = 0;
+const ALLOWED: u8 = 1;
+const ERASED: u8 = 2;
+
+/// From now on a page is erased only if the watchdog was refreshed since the last one: two erases and the tasks' proofs
+/// that they run may take longer than its period.
+pub(crate) fn watch_erases() {
+    ERASES.store(ALLOWED, Ordering::Relaxed);
+}
+
+/// The watchdog was refreshed.
+#[inline(always)]
+pub(crate) fn allow_erase() {
+    if ERASES.load(Ordering::Relaxed) == ERASED {
+        watch_erases();
+    }
 }
 
 /// The flash controller, and as [`Pages`] the pages of the store.
@@ -133,6 +156,19 @@ impl Flash {
         self.power.csr().read().pvdo().bit_is_clear()
     }
 
+    /// Returns whether the watchdog was refreshed since the last erase, or since [`has_worked`](Self::has_worked).
+    #[must_use]
+    pub fn may_erase() -> bool {
+        ERASES.load(Ordering::Relaxed) != ERASED
+    }
+
+    /// Ends a row of operations that took long: the next erase comes after a refresh of the watchdog.
+    pub fn has_worked() {
+        if ERASES.load(Ordering::Relaxed) == ALLOWED {
+            ERASES.store(ERASED, Ordering::Relaxed);
+        }
+    }
+
     fn detector_is_set(&self) -> bool {
         let settings = self.power.cr().read();
         settings.pvde().bit_is_set() && settings.pls().bits() == PVD_LEVEL
@@ -145,14 +181,15 @@ impl Flash {
     ///
     /// As for [`run`].
     unsafe fn operate(&mut self, operation: Operation) -> Result<(), FlashError> {
-        /// Cycles of one poll of the controller, at least: a load of a register, a test and a branch.
-        const CYCLES_OF_A_POLL: u32 = 5;
+        /// Cycles of one poll of the controller, at least: a load of a register, two comparisons and two branches.
+        const CYCLES_OF_A_POLL: u32 = 9;
         let bound_us = match operation {
             Operation::Program { .. } => FLASH_PROGRAM_US,
             Operation::Erase { .. } => FLASH_ERASE_US,
         };
-        if !self.has_supply() {
-            return Err(FlashError::LowSupply);
+        let erases = matches!(operation, Operation::Erase { .. });
+        if !self.has_supply() || erases && !Self::may_erase() {
+            return Err(FlashError::NotNow);
         }
         let flash = &self.flash;
         // The manual asks for this check first (PM0075 2.3.3): an operation that did not end in time may still run.
@@ -160,6 +197,9 @@ impl Flash {
             return Err(FlashError::Failed);
         }
         self.unlock()?;
+        if erases {
+            Self::has_worked();
+        }
         // Clear the flags of an earlier operation by writing 1; otherwise its EOP would count for this operation.
         flash.sr().write(|w| {
             w.eop().set_bit();
@@ -188,15 +228,14 @@ impl Flash {
     }
 
     fn unlock(&self) -> Result<(), FlashError> {
-        let locked = || self.flash.cr().read().lock().bit_is_set();
-        // Writing the keys to an unlocked controller would lock it until the next reset.
-        if locked() {
-            for key in KEYS {
-                // SAFETY: the register takes these two keys in this order.
-                self.flash.keyr().write(|w| unsafe { w.key().bits(key) });
-            }
+        // Writing the keys to an unlocked controller would lock it until the next reset. A clone of the part is reported to
+        // read LOCK as 0 while it is locked.
+        self.flash.cr().write(|w| w.lock().set_bit());
+        for key in KEYS {
+            // SAFETY: the register takes these two keys in this order.
+            self.flash.keyr().write(|w| unsafe { w.key().bits(key) });
         }
-        if locked() {
+        if self.flash.cr().read().lock().bit_is_set() {
             Err(FlashError::Failed)
         } else {
             Ok(())

@@ -1,10 +1,12 @@
 //! The independent watchdog. It resets the device when it is not refreshed, even when the main clock has stopped.
 //! It runs from the first steps of a start.
 
+use cortex_m::interrupt;
 use stm32f1xx_hal::pac::{self, iwdg::pr::PR as Prescaler};
 
 use crate::{
     design::{WATCHDOG_RELOAD, WATCHDOG_SETTINGS_US, WATCHDOG_START_RELOAD},
+    flash,
     wait::within_us,
 };
 
@@ -23,7 +25,7 @@ impl Watchdog {
     /// [`WATCHDOG_START_MS`](crate::design::WATCHDOG_START_MS), so that a start that hangs is reset, too. The
     /// watchdog stops while a debugger halts the core.
     pub(crate) fn start(iwdg: pac::IWDG, debug: &pac::DBGMCU) -> Self {
-        Self::started(iwdg, debug, Prescaler::DivideBy16, WATCHDOG_START_RELOAD)
+        Self::started(iwdg, debug, Prescaler::DivideBy32, WATCHDOG_START_RELOAD)
     }
 
     /// The same, with the period of the loader, [`WATCHDOG_LOADER_MS`](crate::design::WATCHDOG_LOADER_MS).
@@ -51,9 +53,10 @@ impl Watchdog {
     pub fn arm(&mut self) {
         // `start` has waited until PVU and RVU are clear, so PR and RLR may be written (RM0008 19.4.4).
         self.write_key(OPEN);
-        self.iwdg.pr().write(|w| w.pr().divide_by8());
+        self.iwdg.pr().write(|w| w.pr().divide_by16());
         self.iwdg.rlr().write(|w| w.rl().set(WATCHDOG_RELOAD));
         self.reload_when_set();
+        flash::watch_erases();
     }
 
     /// Waits until the settings are in force, then reloads the counter. An earlier reload would use the old value.
@@ -67,7 +70,11 @@ impl Watchdog {
 
     /// Refreshes the watchdog.
     pub fn refresh(&mut self) {
-        self.write_key(RELOAD);
+        // No erase comes between the two.
+        interrupt::free(|_| {
+            self.write_key(RELOAD);
+            flash::allow_erase();
+        });
     }
 
     fn write_key(&mut self, key: u16) {

@@ -9,7 +9,8 @@
 //! On both the bytes take a millisecond each, so a task that runs once a millisecond moves them.
 //!
 //! A silence is measured from the call that found the last byte. While flash is erased the task does not run for up to
-//! 40 ms. A silence that begins in that time counts as up to 40 ms shorter, and one that ends in it is not seen.
+//! 40 ms, on clones of the part 400. A silence that begins in that time counts as up to as much shorter, and one that ends in
+//! it is not seen.
 
 use board_support::uart::LineSettings;
 use embedded_hal::digital::{InputPin, OutputPin};

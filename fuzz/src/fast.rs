@@ -34,6 +34,7 @@ const MODULES: [Module; 4] = [Module::Di4, Module::Do4, Module::Ai4, Module::Ao4
 /// An arbitration without a guard: every start bit since the last turn counts.
 const WINDOWS: Windows = Windows {
     start: 1 << 16,
+    start_ms: 0,
     length: 100 << 16,
     guard: 0,
 };

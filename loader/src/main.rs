@@ -80,7 +80,7 @@ impl Part for Unit {
             let pages = &mut self.loading.boot_pages();
             match self.journal.write(pages, record) {
                 // The supply has fallen since.
-                Err(WriteError::Flash(FlashError::LowSupply)) => {}
+                Err(WriteError::Flash(FlashError::NotNow)) => {}
                 written => return written.map_err(|_| Unwritten),
             }
         }

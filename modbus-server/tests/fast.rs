@@ -169,6 +169,7 @@ impl Unit {
         };
         let windows = Windows {
             start: 1_000,
+            start_ms: 0,
             length: 100,
             guard: 10,
         };

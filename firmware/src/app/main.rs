@@ -14,7 +14,7 @@
 //! | `idle` | - | - | refreshes the watchdog when each task above has set its mark; sleeps |
 //!
 //! The tasks of priority 4 run from RAM with all that they call (`memory.x`). They continue while flash is erased
-//! or programmed; the others wait for up to 40 ms.
+//! or programmed; the others wait for up to 40 ms, on clones of the part 400.
 //!
 //! `serve`, `scan`, `second` and `background` act as software tasks, but each is bound to an interrupt that nothing else
 //! uses. docs/decisions.md says why.

@@ -50,8 +50,13 @@ impl Persistence {
     /// operation at a time with interrupts in between. Then restarts the device if that was ordered.
     pub fn work(&mut self, device: &mut impl Mutex<T = &'static mut Device>) -> Option<Event> {
         let save = device.lock(|device| device.config.is_saving());
-        let event = if save { self.save(device) } else { None };
-        if KEEPS_OUTPUTS && !save {
+        // A record that finds a page erased does not erase one itself.
+        let event = if save && !self.erase {
+            self.save(device)
+        } else {
+            None
+        };
+        if KEEPS_OUTPUTS && !save && !self.erase {
             let now = device.lock(|device| device.state.millis());
             if self.schedule.is_due(now) {
                 self.record(device);
@@ -79,18 +84,16 @@ impl Persistence {
     }
 
     /// Erases the page that is no longer needed, if there is one, so that the next save does not have to. This
-    /// takes up to 40 ms, during which only the tasks in RAM run.
+    /// takes up to 40 ms, on clones of the part 400 ms, during which only the tasks in RAM run.
     pub fn erase(&mut self) {
         // A save that waits for the supply may have begun on that page.
-        if !self.erase || self.saving.is_some() || !self.pages.has_supply() {
+        if !self.erase || self.saving.is_some() || !self.pages.has_supply() || !Flash::may_erase() {
             return;
         }
         self.erase = false;
-        // After a failure of the flash, the next save that needs the page erases it. After a low supply, this
-        // function tries again.
-        if let Err(WriteError::Flash(FlashError::LowSupply)) =
-            self.store.make_spare(&mut self.pages)
-        {
+        // After a failure of the flash, the next save that needs the page erases it. If it is only too early, or the supply is
+        // low, this function tries again.
+        if let Err(WriteError::Flash(FlashError::NotNow)) = self.store.make_spare(&mut self.pages) {
             self.erase = true;
         }
     }
@@ -123,7 +126,12 @@ impl Persistence {
         }
         // A record that is not complete does not count.
         let _ = saving.finish(&mut self.store, &self.pages);
+        self.end_of_record();
+    }
+
+    fn end_of_record(&mut self) {
         self.erase = !self.store.has_spare();
+        Flash::has_worked();
     }
 
     // Not inlined, so that the copy is on the stack during a save only.
@@ -161,7 +169,7 @@ impl Persistence {
         {
             match operation.perform(&mut self.pages) {
                 Ok(()) => {}
-                Err(WriteError::Flash(FlashError::LowSupply)) => {
+                Err(WriteError::Flash(FlashError::NotNow)) => {
                     self.refused = Some(operation);
                     return self.wait(saving);
                 }
@@ -173,7 +181,7 @@ impl Persistence {
         }
         self.low = false;
         good = saving.finish(&mut self.store, &self.pages).is_ok() && good;
-        self.erase = !self.store.has_spare();
+        self.end_of_record();
         Some(if good {
             Self::end(&settings, device);
             Event::Saved
@@ -199,6 +207,7 @@ impl Persistence {
     /// Keeps a save until the supply has recovered. Returns the event to log, once.
     fn wait(&mut self, saving: Saving) -> Option<Event> {
         self.saving = Some(saving);
-        (!core::mem::replace(&mut self.low, true)).then_some(Event::LowSupply)
+        let is_low = !self.pages.has_supply();
+        (is_low && !core::mem::replace(&mut self.low, true)).then_some(Event::LowSupply)
     }
 }

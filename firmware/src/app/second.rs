@@ -6,7 +6,8 @@
 //!              <--- TO_SEND ----
 //! ```
 //!
-//! The task does not run while flash is erased, for up to 40 ms. A queue holds 64 bytes, which take 66 ms.
+//! The task does not run while flash is erased, for up to 40 ms. A queue holds 64 bytes, which take 66 ms. On
+//! clones of the part, whose erases take up to 400 ms, frames can be lost.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -163,7 +164,7 @@ impl Polling {
         self.polled_at = now;
         let polled = second.lock(|second| {
             let second = in_use(second)?;
-            // At most the 40 ms for which an erase stops this task.
+            // At most the 400 ms for which an erase may stop this task.
             let waits = second.poll(now, passed as u16);
             Some((waits, second.works()))
         });

@@ -165,7 +165,7 @@ pub fn up(
     let prepared = store.prepare(&mut pages);
     match prepared {
         Ok(()) => {}
-        Err(WriteError::Flash(FlashError::LowSupply)) => log.event(log::Event::LowSupply),
+        Err(WriteError::Flash(FlashError::NotNow)) => log.event(log::Event::LowSupply),
         Err(_) => log.event(log::Event::SaveFailed),
     }
     // An erase that failed here is done by the background task, as after a change of pages.
@@ -268,16 +268,16 @@ fn build(trusted: bool) -> u16 {
     bit(build_bits::DEVELOPMENT_SIGNED, signed) | bit(build_bits::DEVELOPMENT_TRUSTED, trusted)
 }
 
-/// Returns a limit for the duration of a reply in microseconds: the longest frame, with 2 % and a millisecond in
-/// reserve.
+/// Returns a limit for the duration of a reply in microseconds: the longest frame with a bit between characters, as clones
+/// of the part send it, and with 2 % and a millisecond in reserve.
 fn longest_reply_us(line: uart::LineSettings, framing: Framing) -> u32 {
     // V1.02 2.5.1 and 2.5.2.1: 256 bytes in RTU mode, 513 characters in ASCII mode.
     let characters = match framing {
         Framing::Rtu => 256,
         Framing::Ascii { .. } => 513,
     };
-    let bits = characters * line.format.bits();
-    // At most 513 * 11 bits, so the product fits 32 bits.
+    let bits = characters * (line.format.bits() + 1);
+    // At most 513 * 12 bits, so the product fits 32 bits.
     let us = bits * 10_000 / (line.baud / 100).max(1);
     us + us / 50 + 1_000
 }

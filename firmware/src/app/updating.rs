@@ -19,8 +19,6 @@ use crate::{
     clock,
 };
 
-/// Time between two erases, in milliseconds: the watchdog needs a sign of life of every task, and each is asked in turn.
-const ERASES_APART_MS: u32 = 25;
 /// Time in which the watchdog can be refreshed, in milliseconds.
 const STEPS_APART_MS: u32 = 1;
 /// Steps without such a pause: as many as blocks are staged.
@@ -72,7 +70,7 @@ impl Updating {
             let next = device.lock(|device| device.update.as_ref()?.next());
             let Some(job) = next else { return };
             let erases = matches!(job, Job::InSlot(InSlot::Erase(_)));
-            if erases && clock::millis().wrapping_sub(self.ended) < ERASES_APART_MS {
+            if erases && !Flash::may_erase() {
                 return;
             }
             let Some(done) = self.perform(&job, flash) else {
@@ -104,7 +102,7 @@ impl Updating {
         }
     }
 
-    /// Performs a step. Returns `None` if it must wait, because the supply is low.
+    /// Performs a step. Returns `None` if it must wait, because the supply is low or the watchdog comes first.
     fn perform(&mut self, job: &Job, flash: &mut Flash) -> Option<Done> {
         let done = match job {
             Job::Write(record) => write(&mut self.journal, flash, *record).map(Done::Written),
@@ -112,7 +110,7 @@ impl Updating {
         };
         match done {
             Ok(done) => Some(done),
-            Err(FlashError::LowSupply) => None,
+            Err(FlashError::NotNow) => None,
             Err(FlashError::Failed) => Some(job.failed()),
         }
     }

@@ -126,7 +126,7 @@ impl Store {
     }
 
     /// Prepares the pages for saves. Call this at every start, before the line is served: it may take 120 ms for
-    /// two erases and the programming of a record. Does nothing when nothing was saved since the last start.
+    /// two erases and the programming of a record, on clones of the part 840. Does nothing when nothing was saved since the last start.
     ///
     /// # Errors
     ///
@@ -159,7 +159,7 @@ impl Store {
     }
 
     /// Erases the page without the newest record, unless [`Self::has_spare`]. This stops the program for up to 40
-    /// ms.
+    /// ms, on clones of the part 400.
     ///
     /// # Errors
     ///

@@ -33,8 +33,8 @@ impl Bus {
     pub fn new(baud: u32, count: u8, errors: f64, seed: u64) -> Self {
         let mut rng = StdRng::seed_from_u64(seed);
         let bit = 1e6 / f64::from(baud);
-        // The longest reply takes 65,536 ticks, and a fraction is 1/65,536 of a tick.
-        let fraction = (256.0 * 11.0 * bit + 1_000.0) / 65_536.0 / 65_536.0;
+        // The longest reply of a clone, with a bit between characters, takes 65,536 ticks. A fraction is 1/65,536 of a tick.
+        let fraction = (256.0 * 12.0 * bit + 1_000.0) / 65_536.0 / 65_536.0;
         let fractions = |us: f64| (us / fraction) as u32;
         let units = (1..=count)
             .map(|n| {

@@ -78,9 +78,10 @@ impl Master {
     }
 
     /// Lets the first input of the second unit change every 10 ms from now on, for these seconds.
-    pub fn bounce_second(&mut self, seconds: f64) {
-        for n in 0..(seconds * 100.0) as u32 {
-            let at = self.bus.now + f64::from(n) * 10_000.0;
+    pub fn bounce_second(&mut self, hz: f64, seconds: f64) {
+        let half_us = 5e5 / hz;
+        for n in 0..(seconds * 2.0 * hz) as u32 {
+            let at = self.bus.now + f64::from(n) * half_us;
             self.bus.units[1].change(at, 0, n % 2 == 0);
         }
     }

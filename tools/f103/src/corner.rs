@@ -8,6 +8,7 @@ use core::str::FromStr;
 
 use crate::costs::Costs;
 use crate::periph::clocks::Oscillators;
+use crate::periph::flash::Durations;
 use crate::time::Time;
 
 /// A corner of the part.
@@ -20,11 +21,14 @@ pub enum Corner {
     Slow,
     /// Oscillators fast; instructions as nominal.
     Fast,
+    /// A clone of the part, such as GD32F103: long page erases, an idle bit between two characters that are sent, and LOCK of
+    /// FLASH_CR reads 0. The rest as fast.
+    Gd32,
 }
 
 impl Corner {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Nominal, Self::Slow, Self::Fast];
+    pub const ALL: [Self; 4] = [Self::Nominal, Self::Slow, Self::Fast, Self::Gd32];
 
     /// Its name.
     #[must_use]
@@ -33,6 +37,7 @@ impl Corner {
             Self::Nominal => "nominal",
             Self::Slow => "slow",
             Self::Fast => "fast",
+            Self::Gd32 => "gd32",
         }
     }
 
@@ -41,7 +46,7 @@ impl Corner {
     pub const fn costs(self) -> Costs {
         match self {
             Self::Slow => Costs::SLOW,
-            Self::Nominal | Self::Fast => Costs::NOMINAL,
+            Self::Nominal | Self::Fast | Self::Gd32 => Costs::NOMINAL,
         }
     }
 
@@ -59,7 +64,7 @@ impl Corner {
                 lsi: 30_000,
                 hse_start: Time::from_ms(10),
             },
-            Self::Fast => Oscillators {
+            Self::Fast | Self::Gd32 => Oscillators {
                 hsi: 8_200_000,
                 hse: 8_000_800,
                 lsi: 60_000,
@@ -76,7 +81,7 @@ impl Corner {
     pub const fn ug_delay(self) -> u32 {
         match self {
             Self::Nominal => 0,
-            Self::Slow | Self::Fast => 16,
+            Self::Slow | Self::Fast | Self::Gd32 => 16,
         }
     }
 
@@ -85,8 +90,29 @@ impl Corner {
     pub const fn adc_noise(self) -> u16 {
         match self {
             Self::Nominal => 0,
-            Self::Slow | Self::Fast => 2,
+            Self::Slow | Self::Fast | Self::Gd32 => 2,
         }
+    }
+
+    /// Returns the durations of flash operations.
+    #[must_use]
+    pub fn flash_durations(self) -> Durations {
+        let usual = Durations::default();
+        match self {
+            Self::Nominal | Self::Slow | Self::Fast => usual,
+            // GD32F103xx data sheet, table "Flash memory characteristics": a page erase takes 60 to 100 ms, in the data sheets
+            // of its relatives up to 300.
+            Self::Gd32 => Durations {
+                erase: Time::from_ms(300),
+                ..usual
+            },
+        }
+    }
+
+    /// Returns whether this is a clone of the part.
+    #[must_use]
+    pub const fn is_clone(self) -> bool {
+        matches!(self, Self::Gd32)
     }
 }
 
@@ -103,7 +129,7 @@ impl FromStr for Corner {
         Self::ALL
             .into_iter()
             .find(|corner| corner.name() == text)
-            .ok_or_else(|| format!("there is no corner '{text}': nominal, slow or fast"))
+            .ok_or_else(|| format!("there is no corner '{text}': nominal, slow, fast or gd32"))
     }
 }
 
@@ -117,6 +143,9 @@ mod tests {
             assert_eq!(corner.name().parse(), Ok(corner));
         }
         let error = "hot".parse::<Corner>().unwrap_err();
-        assert_eq!(error, "there is no corner 'hot': nominal, slow or fast");
+        assert_eq!(
+            error,
+            "there is no corner 'hot': nominal, slow, fast or gd32"
+        );
     }
 }

@@ -111,6 +111,8 @@ impl<C: Circuit> Chip<C> {
     pub fn in_circuit(image: &Image, config: Config, circuit: C) -> Result<Self, Error> {
         let part = config.part;
         let mut flash = Flash::new(part, config.write_protection, config.seed);
+        flash.durations = config.corner.flash_durations();
+        flash.hides_lock = config.corner.is_clone();
         if let Some(contents) = &config.flash {
             if contents.len() != part.flash_size {
                 return Err(Error::Image(format!(

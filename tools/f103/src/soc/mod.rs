@@ -146,6 +146,9 @@ impl<C: Circuit> Soc<C> {
             notes: Vec::new(),
         };
         soc.adc1.set_noise(config.corner.adc_noise());
+        for usart in &mut soc.usarts {
+            usart.set_idle_bits(config.corner.is_clone().into());
+        }
         soc.set_clocks(Time::ZERO);
         soc.wire(Block::Afio, Time::ZERO);
         soc

@@ -22,7 +22,7 @@ pub struct Edge {
     pub point: u16,
     /// New level of the input.
     pub on: bool,
-    /// Whether the edge may have happened up to 40 ms earlier.
+    /// Whether the edge may have happened earlier, while flash was erased.
     pub late: bool,
     /// Time of the edge, by the clock of this computer.
     pub at: DateTime<Local>,

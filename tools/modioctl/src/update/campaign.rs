@@ -31,8 +31,8 @@ const SLOWEST: Duration = Duration::from_millis(40);
 const FIRST_BLOCKS: usize = 32;
 /// Time until both staged blocks are programmed, and a unit reports what it is missing.
 const STAGED: Duration = Duration::from_millis(10);
-/// Time in which a unit erases a page.
-const ERASING: Duration = Duration::from_millis(50);
+/// Time in which a unit erases a page, once its watchdog allows it.
+const ERASING: Duration = Duration::from_millis(130);
 /// Time between two questions to units that restart or confirm.
 const POLL: Duration = Duration::from_millis(500);
 /// Number of missing blocks up to which a unit is first asked whether any is still missing.

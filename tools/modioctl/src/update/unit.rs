@@ -8,7 +8,8 @@ use super::{Fault, Status};
 /// Number of requests in a row without an answer after which a unit is given up. Two of them are sent with little
 /// patience, the others repeated as often as the line says.
 const SILENCES: u8 = 4;
-/// Number of polls while a unit erases, 200 ms and more apart: ten times as long as it needs.
+/// Number of polls while a unit erases, 500 ms and more apart: ten times as long as it needs, and more than twice as long
+/// as a clone of the part.
 const ERASE_POLLS: u8 = 150;
 /// Number of polls after a restart, half a second and more apart, until the image must run.
 const RESTART_POLLS: u8 = 60;

@@ -269,7 +269,7 @@ mod tests {
         for (arguments, part) in [
             (&["--dip", "256"][..], "256 is not in 0..=255"),
             (&["--module", "8di"][..], "one of none, 4di"),
-            (&["--corner", "hot"][..], "nominal, slow or fast"),
+            (&["--corner", "hot"][..], "nominal, slow, fast or gd32"),
             (&["--tcp", "nowhere"][..], "not an address"),
             (&["--http", "127.0.0.1:99999"][..], "not an address"),
             (&["--flash"][..], "--flash <FILE>"),

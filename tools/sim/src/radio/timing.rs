@@ -58,7 +58,7 @@ pub const OUTPUT_DELAY: Time = Time::from_ms(5);
 pub const fn packet(bytes: usize, rate: u32, corner: Corner) -> Time {
     let bits = OVERHEAD_BITS + 8 * bytes as u64;
     let times = match corner {
-        Corner::Nominal | Corner::Fast => 1,
+        Corner::Nominal | Corner::Fast | Corner::Gd32 => 1,
         Corner::Slow => 2,
     };
     Time::cycles(bits * times, rate)

@@ -138,7 +138,7 @@ pub struct Most(pub Time, pub Time);
 impl Most {
     pub const fn of(&self, corner: Corner) -> Time {
         match corner {
-            Corner::Nominal | Corner::Fast => self.0,
+            Corner::Nominal | Corner::Fast | Corner::Gd32 => self.0,
             Corner::Slow => self.1,
         }
     }

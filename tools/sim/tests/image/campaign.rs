@@ -11,6 +11,11 @@ use crate::LAYOUT;
 use crate::bench::{FIRST, adu, file};
 use crate::in_slots::{CHECK, START, flash, image, made};
 
+/// Returns the flash of a board with an image in slot A alone, a 4DI and this rate.
+pub fn stored(baud: Baud) -> Vec<u8> {
+    flash([&image(0), &[]], Module::Di4, &[(BAUD, baud.code())])
+}
+
 /// A line with boards that run from slot A.
 pub struct Line {
     bus: Bus,
@@ -22,6 +27,8 @@ pub struct Line {
     noise: u64,
     /// Each unit is asked for its points once a second.
     pub polls: bool,
+    /// Time within which the answer to a poll has to begin.
+    pub patience: Time,
     due: Time,
     /// Polls, and those without an answer.
     pub polled: [u32; 2],
@@ -34,15 +41,13 @@ pub struct Line {
 
 impl Line {
     pub fn new(baud: Baud, units: u8) -> Self {
-        let boards = (1..=units).map(|unit| {
-            let stored = [(BAUD, baud.code())];
-            made(
-                flash([&image(0), &[]], Module::Di4, &stored),
-                Module::Di4,
-                unit,
-            )
-        });
-        let boards: Vec<Board> = boards.collect();
+        let boards = (1..=units).map(|unit| made(stored(baud), Module::Di4, unit));
+        Self::of(baud, boards.collect())
+    }
+
+    /// The same, with these boards, whose addresses count from 1.
+    pub fn of(baud: Baud, boards: Vec<Board>) -> Self {
+        let units = boards.len() as u8;
         let mut line = Self {
             bus: Bus::new(boards),
             units,
@@ -53,6 +58,7 @@ impl Line {
             errors: 0,
             noise: 1,
             polls: false,
+            patience: Time::from_ms(100),
             due: Time::ZERO,
             polled: [0; 2],
             blocks: None,
@@ -131,7 +137,8 @@ impl Line {
             if self.polls && self.bus.now() >= self.due {
                 self.due = self.bus.now() + Time::from_ms(1000);
                 for unit in 1..=self.units {
-                    let answer = self.ask(unit, &[2, 0, FIRST, 0, 4], Patience::Little);
+                    self.send(unit, &[2, 0, FIRST, 0, 4]);
+                    let answer = self.answer(unit, self.patience);
                     self.polled[0] += 1;
                     self.polled[1] += u32::from(answer.is_none());
                 }

@@ -12,6 +12,7 @@ const LAYOUT: &Layout = &MODIO_08;
 
 mod analog;
 mod as_it_was;
+mod clones;
 mod digital;
 mod fast;
 mod faults_of_slots;

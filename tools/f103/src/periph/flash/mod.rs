@@ -93,6 +93,8 @@ pub struct Flash {
     cells: Cells,
     /// How long operations take.
     pub durations: Durations,
+    /// LOCK reads 0 while the controller is locked, as it is reported of a clone of the part.
+    pub hides_lock: bool,
     /// The result of a power cut during an operation.
     pub torn: Torn,
     /// Whether the HSI, which times the operations, runs (PM0075 2.3).
@@ -129,6 +131,7 @@ impl Flash {
         Self {
             cells: Cells::erased(part, seed),
             durations: Durations::default(),
+            hides_lock: false,
             torn: Torn::default(),
             hsi_on: true,
             wrpr,
@@ -297,7 +300,8 @@ impl Flash {
 
 impl Peripheral for Flash {
     fn read(&mut self, offset: u32, _now: Time) -> Result<u32, Unmodelled> {
-        let locked = if self.lock == Lock::Open { 0 } else { CR_LOCK };
+        let hides = self.lock == Lock::Open || self.hides_lock;
+        let locked = if hides { 0 } else { CR_LOCK };
         let strt = match self.busy.map(|busy| busy.operation) {
             Some(Operation::Page { .. } | Operation::Mass) => CR_STRT,
             _ => 0,

@@ -105,6 +105,21 @@ fn a_wrong_key_locks_until_reset() {
 }
 
 #[test]
+fn clone_hides_that_it_is_locked_and_takes_the_keys_once() {
+    let mut flash = Flash::new(&STM32F103CB, u32::MAX, SEED);
+    flash.hides_lock = true;
+    assert_eq!(flash.read(0x10, NOW), Ok(0));
+    unlock(&mut flash);
+    assert_eq!(flash.read(0x10, NOW), Ok(0));
+    flash.write(0x10, CR_LOCK, NOW).unwrap();
+    unlock(&mut flash);
+    assert!(flash.take_complaint().is_none());
+    // It is open.
+    flash.write(4, KEYS[0], NOW).unwrap();
+    assert!(flash.take_complaint().unwrap().bus_error);
+}
+
+#[test]
 fn an_erase_takes_30_ms_and_only_its_page() {
     let mut flash = open();
     flash.bytes_mut().fill(0);

@@ -78,6 +78,8 @@ pub struct Usart {
     data_writes: u64,
     /// Start of the baud generator at its present rate.
     baud_since: Time,
+    /// Idle bits between two characters that are sent: a property of the part.
+    idle_bits: u8,
 }
 
 impl Default for Usart {
@@ -101,11 +103,17 @@ impl Default for Usart {
             quiet_since: Time::ZERO,
             data_writes: 0,
             baud_since: Time::ZERO,
+            idle_bits: 0,
         }
     }
 }
 
 impl Usart {
+    /// Sets the number of idle bits between two characters that are sent.
+    pub(crate) fn set_idle_bits(&mut self, bits: u8) {
+        self.idle_bits = bits;
+    }
+
     /// Returns the number of writes to the data register since the last reset, with those that were lost.
     #[must_use]
     pub const fn data_writes(&self) -> u64 {
@@ -174,6 +182,7 @@ impl Usart {
             since: self.baud_since,
             data_bits: self.data_bits(),
             stop_bits: self.stop_bits(),
+            idle_bits: self.idle_bits,
         })
     }
 
@@ -382,6 +391,7 @@ impl Peripheral for Usart {
             tx: Transmitter::with_sent(sent),
             rx_pin: Wave::new(self.rx_pin.last_level()),
             last_edges: self.last_edges,
+            idle_bits: self.idle_bits,
             ..Self::default()
         };
     }

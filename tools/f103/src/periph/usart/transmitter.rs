@@ -38,6 +38,8 @@ pub struct Shape {
     pub data_bits: u8,
     /// Stop bits: 1 or 2.
     pub stop_bits: u8,
+    /// Idle bits in front of a character that follows another one.
+    pub idle_bits: u8,
 }
 
 /// What occupies the shift register.
@@ -119,6 +121,11 @@ impl Transmitter {
     /// Starts what waits, at the first tick of the baud generator from `at` on, if the shift register is free. Returns
     /// what was started.
     pub fn start(&mut self, at: Time, shape: Shape) -> Option<Ended> {
+        self.begin(at, shape, false)
+    }
+
+    /// The same. `follows`: a character or a break has ended at this instant.
+    fn begin(&mut self, at: Time, shape: Shape, follows: bool) -> Option<Ended> {
         if self.shift.is_some() {
             return None;
         }
@@ -149,6 +156,10 @@ impl Transmitter {
             return Some(Ended::More { took_data: false });
         }
         let word = self.data.take()?;
+        if follows {
+            self.cycles += u64::from(shape.idle_bits) * u64::from(shape.bit_cycles);
+        }
+        let start = self.end_of_run();
         let character = Character::raw(start, rate, word, shape.data_bits, shape.stop_bits);
         self.sent.push(Sent::Character(character));
         self.occupy(Content::Data, frame, shape);
@@ -159,8 +170,9 @@ impl Transmitter {
     /// not begin anything new. Also returns whether it was a break that ended.
     pub fn finish(&mut self, at: Time, shape: Option<Shape>) -> (Ended, bool) {
         let was_break = matches!(self.shift, Some((Content::Break, _)));
+        let follows = self.is_sending();
         self.shift = None;
-        let next = shape.and_then(|shape| self.start(at, shape));
+        let next = shape.and_then(|shape| self.begin(at, shape, follows));
         (next.unwrap_or(Ended::Complete), was_break)
     }
 

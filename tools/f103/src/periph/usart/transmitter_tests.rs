@@ -62,6 +62,18 @@ fn the_first_character_follows_the_idle_frame() {
 }
 
 #[test]
+fn clone_leaves_an_idle_bit_between_two_characters_and_none_in_front_of_the_first() {
+    let mut usart = transmitter(0, 0);
+    usart.set_idle_bits(1);
+    write(&mut usart, offset::DR, 0x55, cycles(100));
+    write(&mut usart, offset::DR, 0x55, cycles(PREAMBLE));
+    let (first, second) = (cycles(PREAMBLE), cycles(PREAMBLE + 6250 + 625));
+    status(&mut usart, second);
+    let begun = starts(&mut usart).into_iter().map(|(start, ..)| start);
+    assert!(begun.eq([first, second]));
+}
+
+#[test]
 fn two_bytes_deep_without_a_gap_and_tc_at_the_end_of_the_last_stop_bit() {
     let mut usart = transmitter(cr1::TCIE, 0);
     let t = TICK;

@@ -111,7 +111,7 @@ fn edges(model: &Model, item: &Item) -> impl Iterator<Item = Line<'static>> {
         let time = edge.at.format("%H:%M:%S%.3f");
         let age = ago((now - edge.at).to_std().unwrap_or_default());
         let late = if edge.late {
-            ", or up to 40 ms earlier"
+            ", or earlier, within an erase of flash"
         } else {
             ""
         };

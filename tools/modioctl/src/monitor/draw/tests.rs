@@ -256,7 +256,10 @@ fn last_edges_of_the_selected_input_are_shown_newest_first() {
     let rows = &rows[first.unwrap() + 1..];
     let line = |level, ms| format!("{level} {}  5 s ago", time(ms).format("%H:%M:%S%.3f"));
     assert!(
-        rows[0].ends_with(&format!("{}, or up to 40 ms earlier", line("on ", 20))),
+        rows[0].ends_with(&format!(
+            "{}, or earlier, within an erase of flash",
+            line("on ", 20)
+        )),
         "{rows:?}"
     );
     assert!(rows[1].ends_with(&line("off", 100)), "{rows:?}");

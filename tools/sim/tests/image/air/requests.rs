@@ -40,7 +40,7 @@ fn longest_reply_and_longest_request_pass_the_air_with_a_frame_gap_above_the_pau
     // The pause between two packets of 58 bytes is 300 - 60 ms at 2.4 kbit/s, 75 - 60 ms at 9.6 kbit/s, and 0 at 19.2
     // kbit/s. At the slow corner it is 600 - 60, 150 - 60 and 75 - 60 ms.
     let cases = match corner() {
-        Corner::Nominal | Corner::Fast => &[(2, 300), (4, 50), (5, 5)][..],
+        Corner::Nominal | Corner::Fast | Corner::Gd32 => &[(2, 300), (4, 50), (5, 5)][..],
         Corner::Slow => &[(4, 150), (5, 50)],
     };
     for &(air_rate, gap) in cases {
@@ -60,7 +60,7 @@ fn longest_reply_and_longest_request_pass_the_air_with_a_frame_gap_above_the_pau
 #[ignore = "needs the image: cargo xtask test"]
 fn write_of_two_packets_is_answered_with_the_factory_frame_gap() {
     let air_rate = match corner() {
-        Corner::Nominal | Corner::Fast => 2,
+        Corner::Nominal | Corner::Fast | Corner::Gd32 => 2,
         Corner::Slow => 3,
     };
     let mut bench = bench(&[(LORA_AIR_RATE, air_rate)]);
