@@ -23,9 +23,9 @@ const LARGE_RECORD: usize = (HALF_WORDS as usize + 64) * 2;
 const ERASE: u64 = 3;
 /// Number of saves that may fail in a row: the place for the record may not read as erased; then the next is used.
 const TRIES: usize = 2;
-/// A save takes 2 ms, at the slow corner up to 20 ms. A save that has to erase takes 30 ms more, during which the unit
-/// does not serve the line.
-const SAVE: Time = Time::from_ms(60);
+/// A save takes 2 ms, at the slow corner up to 20 ms. An erase before it or after it waits for the watchdog, up to 100 ms,
+/// and takes 30 ms more, during which the unit does not serve the line.
+const SAVE: Time = Time::from_ms(200);
 /// Number of starts after a cut. Unstable cells read differently at each start.
 const STARTS: usize = 2;
 
@@ -107,7 +107,7 @@ fn every_cut_of_a_save(
         // The save may have waited for the supply.
         bench.board.run_for(Time::from_ms(20));
         bench.board.set_supply_mv(GOOD_MV).unwrap();
-        bench.board.run_for(Time::from_ms(100));
+        bench.board.run_for(Time::from_ms(300));
         if bench.board.powered() {
             assert!(changed > 0 && changed < operation - 1, "{changed} changed");
             return operation - 1;
