@@ -1,9 +1,9 @@
 //! The flash, which holds the program and the pages that keep data without power (RM0008 3.3, PM0075 2.3).
 //!
 //! An operation stalls every read of flash: 40 to 70 us for a half-word, 20 to 40 ms for a page, up to 400 ms on clones of
-//! the part. Code in RAM continues. The operation is therefore started and polled from RAM, and only interrupts whose handlers are in RAM
-//! are enabled during it. Every operation unlocks the controller, checks what it reports, and locks it again even when
-//! the operation failed. The store checks that the flash reads back as written.
+//! the part. Code in RAM continues. The operation is therefore started and polled from RAM, and only interrupts whose
+//! handlers are in RAM are enabled during it. Every operation unlocks the controller, checks what it reports, and locks it
+//! again even when the operation failed. The store checks that the flash reads back as written.
 //!
 //! Programming needs a supply of at least 2.0 V (DS5319 table 28). Every operation first reads the voltage
 //! detector, and does not begin while the supply is below its threshold ([`PVD_LEVEL`]).

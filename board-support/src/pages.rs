@@ -56,7 +56,8 @@ pub trait Pages {
     /// When the flash reports an error.
     fn program(&mut self, page: Page, offset: usize, half: u16) -> Result<(), Self::Error>;
 
-    /// Erases a page. This takes 20 to 40 ms, on clones of the part up to 400, during which nothing else runs from this flash.
+    /// Erases a page. This takes 20 to 40 ms, on clones of the part up to 400, during which nothing else runs from this
+    /// flash.
     ///
     /// # Errors
     ///

@@ -230,7 +230,7 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         // Otherwise the times are those of a request that has come since.
         if self.port.is_arbitrating() {
             self.ended = None;
-            // The count is up to 1 ms more than what has passed.
+            // After a count of n at least n - 1 milliseconds have passed.
             if core::mem::take(&mut self.passed_ms) > self.windows.start_ms + 1 {
                 self.port.withdraw();
             }

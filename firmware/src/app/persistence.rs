@@ -49,17 +49,16 @@ impl Persistence {
     /// Begins a save that was ordered, or continues one, until its end or until the supply is too low, one flash
     /// operation at a time with interrupts in between. Then restarts the device if that was ordered.
     pub fn work(&mut self, device: &mut impl Mutex<T = &'static mut Device>) -> Option<Event> {
-        let save = device.lock(|device| device.config.is_saving());
-        // A record that finds a page erased does not erase one itself.
-        let event = if save && !self.erase {
-            self.save(device)
-        } else {
-            None
-        };
-        if KEEPS_OUTPUTS && !save && !self.erase {
-            let now = device.lock(|device| device.state.millis());
-            if self.schedule.is_due(now) {
-                self.record(device);
+        let mut event = None;
+        // Otherwise the page that is no longer needed is erased first, so that no record has to erase one itself.
+        if !self.erase {
+            if device.lock(|device| device.config.is_saving()) {
+                event = self.save(device);
+            } else if KEEPS_OUTPUTS {
+                let now = device.lock(|device| device.state.millis());
+                if self.schedule.is_due(now) {
+                    self.record(device);
+                }
             }
         }
         // Under the lock, so that no save is ordered in between.

@@ -8,7 +8,7 @@ use std::vec::Vec;
 use board_support::line::{Alarms, Character};
 use modbus_server::fast::{self, EventSource, Packet, Waiting};
 use modbus_server::line::{Framing, Receiver};
-use modbus_server::{Adu, Server, Tables};
+use modbus_server::{Adu, Request, Server, Tables};
 
 use super::*;
 
@@ -343,23 +343,38 @@ fn interrupt_without_a_cause_is_disabled() {
     assert!(bench.pass(1), "it is a repair");
 }
 
+/// Continue a scan.
+const SCAN: [u8; 5] = [0xFD, 0x46, 2, 0x53, 0x91];
+
+impl Bench {
+    /// Receives a request of Fast Modbus to all units, which ends at this time.
+    fn receive_scan(&mut self, ended: u32) {
+        self.line.gap.now = ended;
+        for (n, byte) in SCAN.into_iter().enumerate() {
+            self.line.uart.waiting = Some(byte);
+            assert_eq!(self.line.on_uart(|| 0), n + 1 == SCAN.len());
+        }
+    }
+
+    /// Takes part in the arbitration after a request.
+    fn serve_scan(&mut self, mut request: Request<'static>) {
+        let mut unit = fast::Unit::new(1, 17, fast::Part::Everything);
+        assert!(!unit.open(&mut request));
+        let (reply, contest) = self.server.serve_fast(request, &mut unit, &mut NoEvents);
+        self.line.arbitrate(reply, contest);
+    }
+}
+
 #[test]
 fn unit_that_serves_a_request_too_late_for_its_first_window_is_silent() {
     for (late_ms, takes_part) in [(0, true), (1, true), (2, false), (400, false)] {
         let mut bench = Bench::new();
-        // Continue a scan.
-        for (n, byte) in [0xFD, 0x46, 2, 0x53, 0x91].into_iter().enumerate() {
-            bench.line.uart.waiting = Some(byte);
-            assert_eq!(bench.line.on_uart(|| 0), n == 4);
-        }
+        bench.receive_scan(0);
         bench.pass(late_ms);
         // The timer has wrapped, and does not show it.
         bench.line.gap.now = 500;
-        let mut request = bench.line.take().expect("a request waits");
-        let mut unit = fast::Unit::new(1, 17, fast::Part::Everything);
-        assert!(!unit.open(&mut request));
-        let (reply, contest) = bench.server.serve_fast(request, &mut unit, &mut NoEvents);
-        bench.line.arbitrate(reply, contest);
+        let request = bench.line.take().expect("a request waits");
+        bench.serve_scan(request);
         assert_eq!(bench.line.is_replying(), takes_part, "{late_ms} ms");
     }
 }
@@ -367,28 +382,14 @@ fn unit_that_serves_a_request_too_late_for_its_first_window_is_silent() {
 #[test]
 fn request_that_comes_while_another_one_is_served_keeps_its_own_time() {
     let mut bench = Bench::new();
-    let mut unit = fast::Unit::new(1, 17, fast::Part::Everything);
-    let scan = |bench: &mut Bench, ended: u32| {
-        bench.line.gap.now = ended;
-        for byte in [0xFD, 0x46, 2, 0x53, 0x91] {
-            bench.line.uart.waiting = Some(byte);
-            bench.line.on_uart(|| 0);
-        }
-    };
-    scan(&mut bench, 0);
-    let mut serve = |bench: &mut Bench, meanwhile: Option<u32>| {
-        let mut request = bench.line.take().expect("a request waits");
-        if let Some(ended) = meanwhile {
-            scan(bench, ended);
-        }
-        assert!(!unit.open(&mut request));
-        let (reply, contest) = bench.server.serve_fast(request, &mut unit, &mut NoEvents);
-        bench.line.arbitrate(reply, contest);
-    };
-    serve(&mut bench, Some(5_000));
+    bench.receive_scan(0);
+    let request = bench.line.take().expect("a request waits");
+    bench.receive_scan(5_000);
+    bench.serve_scan(request);
     assert!(!bench.line.is_replying());
     bench.line.gap.now = 5_300;
-    serve(&mut bench, None);
+    let request = bench.line.take().expect("another request waits");
+    bench.serve_scan(request);
     assert!(bench.line.is_replying());
     let first = 5_000 + WINDOWS.start;
     let wake = bench.line.gap.wake;

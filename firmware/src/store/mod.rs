@@ -126,7 +126,8 @@ impl Store {
     }
 
     /// Prepares the pages for saves. Call this at every start, before the line is served: it may take 120 ms for
-    /// two erases and the programming of a record, on clones of the part 840. Does nothing when nothing was saved since the last start.
+    /// two erases and the programming of a record, on clones of the part 840. Does nothing when nothing was saved since
+    /// the last start.
     ///
     /// # Errors
     ///

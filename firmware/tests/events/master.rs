@@ -77,7 +77,7 @@ impl Master {
         self.bus.units[1].restart(now, START_US);
     }
 
-    /// Lets the first input of the second unit change every 10 ms from now on, for these seconds.
+    /// Lets the first input of the second unit switch on and off so often in a second, for these seconds.
     pub fn bounce_second(&mut self, hz: f64, seconds: f64) {
         let half_us = 5e5 / hz;
         for n in 0..(seconds * 2.0 * hz) as u32 {

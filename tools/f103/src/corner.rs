@@ -100,8 +100,8 @@ impl Corner {
         let usual = Durations::default();
         match self {
             Self::Nominal | Self::Slow | Self::Fast => usual,
-            // GD32F103xx data sheet, table "Flash memory characteristics": a page erase takes 60 to 100 ms, in the data sheets
-            // of its relatives up to 300.
+            // Public measurements of a GD32F103: a page erase takes 60 to 100 ms (docs/boards.md). Its relatives are reported
+            // with up to 300.
             Self::Gd32 => Durations {
                 erase: Time::from_ms(300),
                 ..usual

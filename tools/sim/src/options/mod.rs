@@ -56,7 +56,7 @@ pub struct Options {
     #[arg(conflicts_with_all = ["units", "board", "dip", "module", "slots", "flash", "gdb", "exact_line"])]
     pub bus: Option<PathBuf>,
 
-    /// Corner of the part (its clocks, its ADC, the time of instructions and radio packets): nominal, slow or fast
+    /// Corner of the part (its clocks, its ADC, the time of instructions and radio packets): nominal, slow, fast or gd32
     #[arg(long, value_name = "NAME", default_value = "nominal")]
     pub corner: Corner,
 

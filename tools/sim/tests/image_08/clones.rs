@@ -3,8 +3,10 @@
 
 use register_map::codes::Baud;
 use register_map::configuration::{BAUD, COMMAND, FILTER, FORMAT};
+use sim::chip;
 use sim::line::Settings;
-use sim::{Config, Corner, Module, Time, chip};
+use sim::periph::flash::Durations;
+use sim::{Board, Config, Corner, Module, Time};
 
 use crate::bench::{Bench, SLOT, adu, board, config, format};
 use crate::campaign::{Line, stored};
@@ -13,15 +15,19 @@ use crate::saving::{SLOWEST, large};
 /// Longer than the page erase of any clone that is known.
 const ERASE: Time = Time::from_ms(400);
 
+/// Returns the board of a clone whose erases take this time.
+fn made(mut config: Config, erase: Time) -> Board {
+    config.chip.corner = Corner::Gd32;
+    let mut board = board(config);
+    board.set_flash_durations(Durations { erase, ..SLOWEST });
+    board
+}
+
 /// Returns a clone with a 4DO at this rate and format, with time to start.
 fn clone(baud: Baud, format_code: u16, settings: &[(u16, u16)]) -> Bench {
     let line = [(BAUD, baud.code()), (FORMAT, format_code)];
-    let mut config: Config = config(Module::Do4, &[settings, &line].concat());
-    config.chip.corner = Corner::Gd32;
-    let mut bench = Bench::of(board(config));
-    let mut durations = SLOWEST;
-    durations.erase = ERASE;
-    bench.board.set_flash_durations(durations);
+    let config = config(Module::Do4, &[settings, &line].concat());
+    let mut bench = Bench::of(made(config, ERASE));
     bench.settings(Settings {
         baud: baud.bits_per_second(),
         format: format(format_code),
@@ -70,18 +76,13 @@ fn saves_with_long_erases_cost_no_reset_no_output_and_no_frame() {
 #[ignore = "needs the image: cargo xtask test"]
 fn update_with_long_erases_loses_no_poll_but_those_of_the_restart() {
     let baud = Baud::B921600;
-    let mut config = Config {
+    let config = Config {
         dip: 1,
         module: Module::Di4,
         chip: chip::Config::holding(stored(baud)),
         ..Config::default()
     };
-    config.chip.corner = Corner::Gd32;
-    let mut board = board(config);
-    let mut durations = SLOWEST;
-    durations.erase = Time::from_ms(390);
-    board.set_flash_durations(durations);
-    let mut line = Line::of(baud, vec![board]);
+    let mut line = Line::of(baud, vec![made(config, Time::from_ms(390))]);
     line.polls = true;
     line.patience = Time::from_ms(400);
     line.update();

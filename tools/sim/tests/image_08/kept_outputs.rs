@@ -1,8 +1,7 @@
 //! What a reset that is not a power-on keeps of the outputs: a reset after any store leaves the old values or the new ones,
 //! and those of another image do not count.
 
-use register_map::codes::Command;
-use register_map::codes::LinkAction;
+use register_map::codes::{Command, LinkAction};
 use register_map::configuration::{AS_IT_WAS, COMM_TIMEOUT, COMMAND, FILTER, START};
 use register_map::links;
 use register_map::part::FLASH_BASE;
