@@ -19,9 +19,9 @@ use crate::{
     pin::Pin,
     rs485,
     second::SecondOff,
-    uart::LineSettings,
     unique_id, vectors, wait,
 };
+use ports::uart::LineSettings;
 
 /// Flags in [`Board::reset_cause`].
 const WATCHDOG: u8 = 1 << 2;

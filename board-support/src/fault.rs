@@ -5,12 +5,6 @@
 //! a watchdog reset: the uptime and the marks of its tasks (`kept::marks`). The record lies in the
 //! [kept region](crate::kept).
 
-/// Number of tasks that leave a mark.
-pub const TASKS: usize = 9;
-
-/// Mark of a task that has run to its end. Any other value counts as missing in the fault record.
-pub const ENDED: u8 = 1;
-
 /// Kinds of fault, with their numbers as reported in the fault record.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]

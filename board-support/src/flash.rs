@@ -19,10 +19,8 @@ use cortex_m::{
 };
 use stm32f1xx_hal::pac;
 
-use crate::{
-    design::{FLASH_ERASE_US, FLASH_PROGRAM_US, PVD_LEVEL, SYSCLK_ON_HSE_HZ},
-    pages::{Page, Pages, Slot},
-};
+use crate::design::{FLASH_ERASE_US, FLASH_PROGRAM_US, PVD_LEVEL, SYSCLK_ON_HSE_HZ};
+use ports::pages::{Page, Pages, Slot};
 
 /// Key sequence that unlocks the controller (PM0075 2.3.1).
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];

@@ -25,6 +25,8 @@ use crate::{
     design::LONGEST_WAIT_US,
     edge::Edge,
     gap::{CharacterBits, GapTicks, LimitTicks, LineTimes},
+};
+use ports::{
     line::{Alarms, GapTimer, Silence},
     uart::LineSettings,
 };

@@ -16,8 +16,6 @@ pub mod gesture;
 #[cfg(any(target_os = "none", test))]
 mod i2c;
 pub mod kept;
-pub mod line;
-pub mod pages;
 mod pin;
 pub mod uart;
 mod usart;

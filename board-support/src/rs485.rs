@@ -9,10 +9,13 @@ use stm32f1xx_hal::pac::{self, usart1::RegisterBlock};
 use crate::{
     ClockSource,
     boards::BOARD,
-    line::{Character, Uart},
     pin::{Mode, Pin},
-    uart::{Format, LineSettings, divider},
+    uart::divider,
     usart::Usart,
+};
+use ports::{
+    line::{Character, Uart},
+    uart::{Format, LineSettings},
 };
 
 /// The UART's flags and interrupt enables, as [`Uart::status`] read them.

@@ -10,9 +10,10 @@ use crate::{
     boards::{BOARD, RadioPins, SecondPins},
     fitted::{self, Fitted},
     pin::Mode,
-    uart::{LineSettings, divider},
+    uart::divider,
     usart::Usart,
 };
+use ports::uart::LineSettings;
 
 /// The UART. Without a second line there is no proof of one, so this is never used.
 const UART: Usart = match BOARD.second {

@@ -6,7 +6,7 @@
 
 use core::sync::atomic::{AtomicU8, Ordering};
 
-use board_support::fault::{ENDED, TASKS};
+use ports::marks::{ENDED, TASKS};
 
 /// Mark of a task that has begun.
 pub const BEGUN: u8 = 2;

@@ -1,16 +1,16 @@
 //! A line: UART, frame-gap timer and port, and its recovery after a disturbance.
 //!
-//! This module does not access hardware: UART and timer are traits of [`board_support::line`]. On the device all of it
+//! This module does not access hardware: UART and timer are traits of [`ports::line`]. On the device all of it
 //! runs from RAM, so that it continues while flash is erased or programmed. Functions that are called from here must be
 //! in RAM, too (`board-support/memory/sections.x`).
 
 use crate::HAS_EVENTS;
-use board_support::line::{GapTimer, Silence, Uart};
 use modbus_server::{
     LineCounters, Reply, Request,
     fast::Contest,
     line::{Arbitration, Faults, Port, Turn, Windows},
 };
+use ports::line::{GapTimer, Silence, Uart};
 
 /// The unit addresses of a line. Both lines have the same type, so that they share their code.
 #[cfg(not(feature = "small"))]

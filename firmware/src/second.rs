@@ -12,7 +12,6 @@
 //! 40 ms, on clones of the part 400. A silence that begins in that time counts as up to as much shorter, and one that ends in
 //! it is not seen.
 
-use board_support::uart::LineSettings;
 use embedded_hal::digital::{InputPin, OutputPin};
 use embedded_hal_nb::serial::{Read, Write};
 use modbus_server::{
@@ -20,6 +19,7 @@ use modbus_server::{
     line::{Faults, Gaps, Port, Receiver},
 };
 use modio_drivers::Lora;
+use ports::uart::LineSettings;
 
 use crate::{config::RadioConfig, line::Units};
 

@@ -13,10 +13,10 @@
 //!           2 a cut   number of operations before it, mess
 //! ```
 
-use board_support::pages::{Page, Pages};
-use loader::Record;
+use boot_state::Record;
+use boot_state::journal::Journal;
 use loader::genuine;
-use loader::journal::Journal;
+use ports::pages::{Page, Pages};
 use register_map::update::{Manifest, Reason, Slot, State, crc32, intact};
 
 use crate::PAGE_SIZE;

@@ -1,7 +1,7 @@
 //! The loader of a modio: chooses which of two images is started, and checks that a new one is genuine. It has no UART,
 //! no command and no protocol.
 //!
-//! [`decide`] has the decisions, [`genuine`](loader::genuine) what an image must be. The loader runs on the internal oscillator and
+//! [`boot_state::decide`] has the decisions, [`genuine`](loader::genuine) what an image must be. The loader runs on the internal oscillator and
 //! leaves everything as after a reset but the watchdog, which cannot be stopped.
 
 #![no_std]
@@ -15,17 +15,16 @@ use board_support::{
     flash::slot_address,
     kept,
     loading::{Loading, slot_bytes},
-    pac,
-    pages::WriteError,
-    restart,
+    pac, restart,
 };
-use cortex_m_rt::{entry, exception};
-use loader::{
+use boot_state::{
     Record,
     decide::{Next, Part, Start, Unwritten, decide},
-    genuine,
     journal::Journal,
 };
+use cortex_m_rt::{entry, exception};
+use loader::genuine;
+use ports::pages::WriteError;
 use register_map::{
     Board,
     layout::HEADER,

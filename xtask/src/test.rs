@@ -26,9 +26,12 @@ pub const CORNER: &str = "MODIO_CORNER";
 const PROGRAMS: [(&str, &str); 2] = [
     (
         "firmware",
-        "firmware board-support modio-drivers modbus-server register-map",
+        "firmware board-support boot-state modio-drivers ports modbus-server register-map",
     ),
-    ("loader", "loader board-support register-map"),
+    (
+        "loader",
+        "loader board-support boot-state ports register-map",
+    ),
 ];
 
 const WORKSPACES: [&str; 3] = ["Cargo.toml", fuzz::MANIFEST, peers::MANIFEST];

@@ -23,7 +23,7 @@
 //! words in one update, after all half-words have the values of its run. An older image writes STARTED alone, and so ends
 //! the values of the run before.
 
-use crate::fault::TASKS;
+use ports::marks::TASKS;
 
 #[cfg(any(target_os = "none", test))]
 mod live;

@@ -18,7 +18,8 @@ use super::{
         SAVES, Sealed, UNSEEN,
     },
 };
-use crate::fault::{ENDED, Fault, Kind, TASKS};
+use crate::fault::{Fault, Kind};
+use ports::marks::{ENDED, TASKS};
 
 /// The seconds from power-on to this start, or before it to the one before. The region has the latter until the outputs
 /// are this run's.

@@ -4,7 +4,7 @@ use core::mem::MaybeUninit;
 
 use board_support::{
     Flash, SLOT, ScanTimer, SecondUart, Watchdog, board, boards::SLOTS, flash::FlashError,
-    gap::LineTimes, kept, pac, stack::LowWater, uart,
+    gap::LineTimes, kept, pac, stack::LowWater,
 };
 use cortex_m::peripheral::SCB;
 use firmware::{
@@ -22,6 +22,7 @@ use modbus_server::{
     line::{Framing, Gaps, Port, Receiver, Width, Windows},
 };
 use modio_drivers::DacLink;
+use ports::uart;
 use register_map::{
     codes::{Format, GapRule, Mode},
     configuration::UNIT,

@@ -4,13 +4,13 @@ use board_support::{
     CrcUnit, Flash, SLOT,
     flash::{BootPages, FlashError},
     kept,
-    pages::{Slot as _, WriteError},
 };
+use boot_state::{Record, journal::Journal};
 use firmware::{
     device::Restart,
     update::{After, Done, InSlot, Job, Update, described},
 };
-use loader::{Record, journal::Journal};
+use ports::pages::{Slot as _, WriteError};
 use register_map::update::Slot;
 use rtic::Mutex;
 

@@ -5,10 +5,10 @@ use core::cell::Cell;
 use std::boxed::Box;
 use std::vec::Vec;
 
-use board_support::line::{Alarms, Character};
 use modbus_server::fast::{self, EventSource, Packet, Waiting};
 use modbus_server::line::{Framing, Receiver};
 use modbus_server::{Adu, Request, Server, Tables};
+use ports::line::{Alarms, Character};
 
 use super::*;
 

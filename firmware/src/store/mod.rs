@@ -45,10 +45,10 @@ use register_map::Board;
 use register_map::record::{Encoder, FIRST_OFFSET, Record, SCHEMA};
 
 use crate::config::Settings;
-pub use board_support::pages::{Page, Pages, WriteError};
 use copied::{Copied, OF_OUTPUTS};
 pub use operation::Operation;
 use operation::{Readying, Writing};
+pub use ports::pages::{Page, Pages, WriteError};
 pub use saving::{Given, Saving};
 use survey::{Place, Survey, record_at};
 

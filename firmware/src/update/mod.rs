@@ -19,8 +19,8 @@ mod tests;
 
 use core::cell::Cell;
 
-use loader::Record;
-use loader::commands::{Refused, Running};
+use boot_state::Record;
+use boot_state::commands::{Refused, Running};
 use modbus_server::{Exception, Span, Words};
 use register_map::codes::Command;
 use register_map::layout::Layout;

@@ -5,7 +5,7 @@ extern crate std;
 use std::vec;
 use std::vec::Vec;
 
-use board_support::pages::Slot as InFlash;
+use ports::pages::Slot as InFlash;
 use register_map::board::MODIO_02;
 use register_map::update::{crc32, place_of};
 

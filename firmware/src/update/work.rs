@@ -1,7 +1,7 @@
 //! What the background task does for an update, one step at a time.
 
-use board_support::pages::Slot;
-use loader::Record;
+use boot_state::Record;
+use ports::pages::Slot;
 use register_map::update::{BLOCK_BYTES, Header, Reason, intact};
 
 /// A block of an image.

@@ -2,7 +2,7 @@
 
 use std::vec;
 
-use loader::Record;
+use boot_state::Record;
 use register_map::update::{Slot, State as OfSlot};
 
 use super::*;

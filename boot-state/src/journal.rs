@@ -16,7 +16,7 @@
 //! whose programming was cut may read differently from start to start; [`Journal::settle`] ends that before anything is
 //! decided.
 
-use board_support::pages::{Page, Pages, WriteError};
+use ports::pages::{Page, Pages, WriteError};
 use register_map::update::{Slot, State, crc32};
 
 use crate::Record;
