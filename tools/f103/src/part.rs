@@ -100,7 +100,45 @@ pub const STM32F103VC: Part = Part {
     ..STM32F103RC
 };
 
+/// Flash and SRAM in KiB of the STM32F103 with each last letter of its name, and that letter (the data sheets of the
+/// four densities).
+const SIZES: [(usize, usize, char); 9] = [
+    (16, 6, '4'),
+    (32, 10, '6'),
+    (64, 20, '8'),
+    (128, 20, 'B'),
+    (256, 48, 'C'),
+    (384, 64, 'D'),
+    (512, 64, 'E'),
+    (768, 96, 'F'),
+    (1024, 96, 'G'),
+];
+
 impl Part {
+    /// Checks that this part has at least these bytes of flash and SRAM. The error names a part that has them.
+    pub(crate) fn check_memories(&self, flash: usize, ram: usize) -> Result<(), String> {
+        if flash <= self.flash_size && ram <= self.ram_size {
+            return Ok(());
+        }
+        let kib = |bytes: usize| bytes.div_ceil(1024);
+        let mut sizes = SIZES.iter();
+        let enough = sizes.find(|(f, r, _)| kib(flash) <= *f && kib(ram) <= *r);
+        let other = match enough {
+            Some((flash, ram, letter)) => {
+                format!("an STM32F103x{letter} with {flash} and {ram} KiB would do")
+            }
+            None => "no STM32F103 has so much".to_owned(),
+        };
+        Err(format!(
+            "the image needs {} KiB of flash and {} KiB of SRAM, but the {} has {} and {} KiB: {other}",
+            kib(flash),
+            kib(ram),
+            self.name,
+            kib(self.flash_size),
+            kib(self.ram_size),
+        ))
+    }
+
     /// Returns whether the part has `block`.
     #[must_use]
     pub fn has(&self, block: Block) -> bool {
@@ -118,5 +156,39 @@ impl Part {
             .iter()
             .find(|(base, _)| address & !0x3FF == *base)
             .map(|&(_, name)| name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn refusal_of_an_image_names_the_smallest_part_that_would_do() {
+        const KIB: usize = 1024;
+        let check = |part: &Part, flash, ram| part.check_memories(flash, ram);
+        for part in [&STM32F103C8, &STM32F103CB, &STM32F103RC, &STM32F103VC] {
+            assert_eq!(check(part, part.flash_size, part.ram_size), Ok(()));
+        }
+        for (flash, ram, part) in [
+            (1, 20 * KIB + 4, "STM32F103xC"),
+            (129 * KIB, 1, "STM32F103xC"),
+            (1, 64 * KIB, "STM32F103xD"),
+            (385 * KIB, 1, "STM32F103xE"),
+            (1, 65 * KIB, "STM32F103xF"),
+            (1025 * KIB, 1, "no STM32F103"),
+            (1, 97 * KIB, "no STM32F103"),
+        ] {
+            let text = check(&STM32F103CB, flash, ram).unwrap_err();
+            assert!(
+                text.contains(part) && text.contains("STM32F103CB has 128 and 20"),
+                "{text}"
+            );
+        }
+        assert!(
+            check(&STM32F103C8, 65 * KIB, 1)
+                .unwrap_err()
+                .contains("xB with 128 and 20")
+        );
     }
 }

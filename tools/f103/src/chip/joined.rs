@@ -8,11 +8,8 @@ use crate::soc::{Circuit, Pin};
 use crate::time::Time;
 
 impl<C: Circuit> Chip<C> {
-    /// Returns the USART whose transmitter is at pin `tx` as of the last instruction: what it sends next, and when.
-    ///
-    /// # Panics
-    ///
-    /// If there is no such USART.
+    /// Returns the USART whose transmitter is at pin `tx` as of the last instruction: what it sends next, and when. One
+    /// that is off if there is none.
     #[must_use]
     pub fn usart(&self, tx: Pin) -> &Usart {
         self.bus.soc.usart(tx)

@@ -7,11 +7,24 @@ use rigless::time::VirtualNanos;
 use super::run::{IPSR, Limit, XPSR};
 use super::segment::{End, Place};
 use super::{Chip, FLASH_BASE, RAM_BASE};
+use crate::finding::What;
 use crate::soc::Circuit;
 use crate::time::Time;
 
 /// The vector table's offset (PM0056 4.4.4).
 const VTOR: u64 = 0xE000_ED08;
+
+/// The number of the hard fault, and of core registers as [`Chip::register`] numbers them.
+const HARD_FAULT: u32 = 3;
+const LR: usize = 14;
+const MSP: usize = 17;
+const PSP: usize = 18;
+/// The bit of EXC_RETURN that selects the process stack, and the place of the return address in the stack frame (PM0056
+/// 2.3.7).
+const SPSEL: u32 = 1 << 2;
+const RETURN_ADDRESS: u32 = 24;
+/// Finding when BKPT has caused a hard fault.
+const BREAKPOINT: &str = "BKPT stops for a debugger; without one, as here, it is a hard fault";
 
 /// The active exception.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -201,6 +214,22 @@ impl<C: Circuit> Chip<C> {
             number,
             handler: handler & !1,
         };
+        if number == HARD_FAULT {
+            self.look_for_breakpoint();
+        }
+    }
+
+    /// Reports a hard fault whose cause is BKPT. Semihosting, which is BKPT as well, was reported before.
+    fn look_for_breakpoint(&mut self) {
+        let link = self.register(LR).unwrap_or_default();
+        let stack = self.register(if link & SPSEL == 0 { MSP } else { PSP });
+        let address = stack.and_then(|stack| self.word(stack.wrapping_add(RETURN_ADDRESS)));
+        let Some(address) = address else { return };
+        let code = self.half(address);
+        if code.is_some_and(|code| code & 0xFF00 == 0xBE00 && code != 0xBEAB) {
+            let what = What::Other(BREAKPOINT);
+            self.bus.findings.add(self.now(), address, what);
+        }
     }
 }
 

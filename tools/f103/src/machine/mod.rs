@@ -103,13 +103,14 @@ impl<C: Circuit> Chip<C> {
     ///
     /// # Errors
     ///
-    /// [`Error::Image`] if the image does not fit into the flash, or if `config.flash` has another size.
+    /// [`Error::Image`] if the image does not fit into the flash or the SRAM, or if `config.flash` has another size.
     ///
     /// # Panics
     ///
     /// On a host that the core cannot generate code for.
     pub fn in_circuit(image: &Image, config: Config, circuit: C) -> Result<Self, Error> {
         let part = config.part;
+        image.check(part)?;
         let mut flash = Flash::new(part, config.write_protection, config.seed);
         flash.durations = config.corner.flash_durations();
         flash.hides_lock = config.corner.is_clone();

@@ -35,6 +35,10 @@ pub(super) const XPSR: usize = 16;
 pub(super) const IPSR: u32 = 0x1FF;
 const NMI: u32 = 2;
 
+/// Finding when the firmware calls a debugger.
+const SEMIHOSTING: &str =
+    "semihosting: BKPT 0xAB calls a debugger; without one, as here, it is a hard fault";
+
 /// A run without a limit in time ends when the core has executed no instruction for this long.
 const GIVE_UP: Time = Time::from_secs(60);
 
@@ -136,7 +140,11 @@ impl<C: Circuit> Chip<C> {
                     self.bus.findings.add(now, pc, What::LockedUp);
                 }
                 // Semihosting is not modelled, so BKPT is a fault, as on a board without a debugger.
-                Exit::HostCall => self.core.answer_host_call(None),
+                Exit::HostCall => {
+                    let (now, pc) = (self.now(), self.pc());
+                    self.bus.findings.add(now, pc, What::Other(SEMIHOSTING));
+                    self.core.answer_host_call(None);
+                }
                 _ => {}
             }
             patience = self.now() + GIVE_UP;
@@ -203,7 +211,7 @@ impl<C: Circuit> Chip<C> {
     }
 
     /// Returns the half-word of code at `address`.
-    fn half(&self, address: u32) -> Option<u16> {
+    pub(super) fn half(&self, address: u32) -> Option<u16> {
         let (bytes, at) = match self.bus.flash_offset(address) {
             Some(at) => (self.bus.soc.flash.bytes(), at),
             None => (self.ram(), address.wrapping_sub(RAM_BASE)),

@@ -1,7 +1,7 @@
 //! Alternate-function I/O, RM0008 section 9.4: the port that feeds each EXTI line, and the debug port's pins.
 //!
-//! Pin remapping is not modelled, except that of CAN, whose traffic is not modelled: every other peripheral is on its
-//! default pins.
+//! Of the remaps only those of the USARTs are modelled, and that of CAN, whose traffic is not modelled: every other
+//! peripheral is on its default pins.
 
 use crate::peripheral::{Peripheral, Unmodelled};
 use crate::time::Time;
@@ -10,6 +10,11 @@ use crate::time::Time;
 const MAPR_SWJ_CFG: u32 = 0b111 << 24;
 /// CAN_REMAP (RM0008 9.4.2).
 const MAPR_CAN_REMAP: u32 = 0b11 << 13;
+/// USART1_REMAP, USART2_REMAP and USART3_REMAP (RM0008 9.4.2).
+const MAPR_USART_REMAPS: u32 = 0b11_1100;
+const MAPR_USART3_REMAP: u32 = 0b11 << 4;
+/// The value of USART3_REMAP that means nothing.
+const NO_USART3_REMAP: u32 = 0b10 << 4;
 
 /// The bits that each EXTICR keeps, read back from two boards after all ones were written (labwired-core,
 /// stm32f1_mmio_diff.rs).
@@ -40,6 +45,12 @@ impl Afio {
         }
     }
 
+    /// Returns AFIO_MAPR without SWJ_CFG.
+    #[must_use]
+    pub const fn mapr(&self) -> u32 {
+        self.mapr
+    }
+
     /// Returns the port that feeds EXTI line `line` (0 to 15): 0 = A, 1 = B, ...
     #[must_use]
     pub fn exti_port(&self, line: usize) -> usize {
@@ -62,9 +73,12 @@ impl Peripheral for Afio {
     fn write(&mut self, offset: u32, value: u32, _now: Time) -> Result<(), Unmodelled> {
         match offset {
             0x04 => {
-                self.mapr = value & MAPR_CAN_REMAP;
+                const KNOWN: u32 = MAPR_CAN_REMAP | MAPR_USART_REMAPS;
+                self.mapr = value & KNOWN;
                 self.debug = (value & MAPR_SWJ_CFG) >> 24;
-                if value & !(MAPR_SWJ_CFG | MAPR_CAN_REMAP) != 0 {
+                if value & !(MAPR_SWJ_CFG | KNOWN) != 0
+                    || value & MAPR_USART3_REMAP == NO_USART3_REMAP
+                {
                     return Err(Unmodelled("pin remapping (AFIO_MAPR)"));
                 }
                 Ok(())
@@ -92,7 +106,11 @@ mod tests {
         let mut afio = Afio::default();
         afio.write(0x0C, 0x0021, Time::ZERO).unwrap();
         assert_eq!((afio.exti_port(4), afio.exti_port(5)), (1, 2));
-        assert!(afio.write(4, 1 << 2, Time::ZERO).is_err(), "USART1 remap");
+        for refused in [1 << 6, 1 << 8, NO_USART3_REMAP] {
+            assert!(afio.write(4, refused, Time::ZERO).is_err(), "{refused:#x}");
+        }
+        afio.write(4, 0b01_1100, Time::ZERO).unwrap();
+        assert_eq!(afio.read(4, Time::ZERO), Ok(0b01_1100), "USARTs");
     }
 
     #[test]

@@ -2,14 +2,19 @@
 //!
 //! PR and RLR are in the LSI's clock domain. A write takes effect after up to five cycles of the LSI (19.4.4); PVU
 //! or RVU is set until then. Without the LSI the write never takes effect: the flag stays set, and further writes
-//! are lost. The start by 0xCCCC turns the LSI on (7.2.9). At the start and at each reload the counter uses the
-//! values of PR and RLR that are in effect at that moment.
+//! are lost. A program that waits for the flag never goes on, so a read of it is reported. The start by 0xCCCC turns
+//! the LSI on (7.2.9). At the start and at each reload the counter uses the values of PR and RLR that are in effect at
+//! that moment.
 
 use crate::peripheral::{Peripheral, Unmodelled};
 use crate::time::Time;
 
 /// LSI cycles until a write to PR or RLR takes effect, at most (RM0008 19.4.4).
 const UPDATE_CYCLES: u64 = 5;
+
+/// Finding when a program looks at PVU or RVU while it cannot clear.
+pub const STUCK: &str = "IWDG_PR or IWDG_RLR was written while the LSI is off: PVU or RVU stays set, and a wait for \
+                         it never ends (start the watchdog or set LSION first)";
 
 const KEY_RELOAD: u32 = 0xAAAA;
 const KEY_ACCESS: u32 = 0x5555;
@@ -56,6 +61,8 @@ pub struct Iwdg {
     /// Instant at which the counter reaches 0 and requests a reset; `None` until it counts.
     reset_at: Option<Time>,
     reset_requested: bool,
+    /// SR was read while PVU or RVU cannot clear.
+    stuck: bool,
 }
 
 impl Iwdg {
@@ -71,6 +78,7 @@ impl Iwdg {
             started: false,
             reset_at: None,
             reset_requested: false,
+            stuck: false,
         }
     }
 
@@ -98,6 +106,11 @@ impl Iwdg {
         core::mem::take(&mut self.reset_requested)
     }
 
+    /// Returns whether SR was read since the last call while PVU or RVU stays set because the LSI is off.
+    pub fn take_stuck(&mut self) -> bool {
+        core::mem::take(&mut self.stuck)
+    }
+
     /// Returns the time from a reload to the reset (RM0008 table 96).
     fn timeout(&self) -> Time {
         // PR 0 to 6 divide by 4 to 256; 7 also divides by 256.
@@ -115,6 +128,7 @@ impl Peripheral for Iwdg {
             0x0C => {
                 let [pvu, rvu] = [&self.prescaler, &self.reload]
                     .map(|setting| u32::from(setting.written.is_some()));
+                self.stuck |= self.lsi.is_none() && pvu | rvu != 0;
                 pvu | rvu << 1
             }
             _ => return Err(Unmodelled("a reserved address of IWDG")),
@@ -260,9 +274,13 @@ mod tests {
         dog.write(8, 999, Time::ZERO).unwrap();
         dog.write(0, KEY_START, Time::ZERO).unwrap();
         let now = at(&mut dog, 60_000_000);
+        assert!(!dog.take_stuck());
         assert_eq!(dog.read(0x0C, now), Ok(3));
+        assert!(dog.take_stuck() && !dog.take_stuck());
         assert_eq!((dog.next_event(), dog.running()), (None, true));
         dog.set_lsi(Some(now));
+        assert_eq!(dog.read(0x0C, now), Ok(3));
+        assert!(!dog.take_stuck(), "they clear soon");
         assert_eq!(dog.next_event(), Some(now + Time::from_us(409_600)));
         let now = at(&mut dog, 60_000_125);
         assert_eq!(dog.read(0x0C, now), Ok(0));

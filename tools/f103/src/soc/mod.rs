@@ -38,7 +38,7 @@ use crate::time::Time;
 pub use circuit::{Circuit, PORTS, Pin, Pins};
 pub use config::Config;
 use map::{BLOCKS, Block};
-use serial::SERIALS;
+use serial::{Places, USARTS};
 
 /// The blocks, and the circuit at the pins.
 #[derive(Debug)]
@@ -60,8 +60,11 @@ pub struct Soc<C> {
     afio: Afio,
     exti: Exti,
     iwdg: Iwdg,
-    /// The USARTs, in the order of [`SERIALS`].
-    usarts: [Usart; SERIALS.len()],
+    usarts: [Usart; USARTS],
+    /// The pins of the USARTs, in the same order.
+    places: Places,
+    /// What is at pins that a USART has left.
+    absent: Usart,
     tim1: Timer,
     tim2: Timer,
     tim3: Timer,
@@ -127,6 +130,8 @@ impl<C: Circuit> Soc<C> {
             exti: Exti::default(),
             iwdg: Iwdg::new(oscillators.lsi),
             usarts: Default::default(),
+            places: Places::default(),
+            absent: Usart::default(),
             tim1: timer(Kind::Advanced),
             tim2: timer(Kind::General),
             tim3: timer(Kind::General),
@@ -186,9 +191,10 @@ impl<C: Circuit> Soc<C> {
     /// or changes something.
     pub fn sync(&mut self, now: Time) {
         self.advance(now);
-        for serial in &SERIALS {
-            self.sync_wire(serial, now);
+        for serial in self.places.0 {
+            self.sync_wire(&serial, now);
         }
+        self.sync_left_wires(now);
         self.find_next();
     }
 
@@ -211,7 +217,7 @@ impl<C: Circuit> Soc<C> {
 
     /// Takes over a change of the next edges at an RX pin.
     pub fn wires_changed(&mut self) {
-        for serial in &SERIALS {
+        for serial in self.places.0 {
             self.note_due(serial.usart);
         }
         self.note_due(Block::Tim1);
@@ -269,20 +275,29 @@ impl<C: Circuit> Soc<C> {
             | Block::Uart4
             | Block::GpioA
             | Block::GpioB
-            | Block::GpioC => {
-                for serial in &SERIALS {
+            | Block::GpioC
+            | Block::GpioD => {
+                for serial in self.places.0 {
                     if serial.usart == block {
-                        self.sync_wire(serial, now);
+                        self.sync_wire(&serial, now);
                     } else if serial.port() == block {
-                        self.sync_wire(serial, now);
-                        self.drive_rx(serial, now);
+                        self.sync_wire(&serial, now);
+                        self.drive_rx(&serial, now);
                     }
                 }
             }
+            // A write may move USARTs to other pins.
+            Block::Afio => {
+                for serial in self.places.0 {
+                    self.sync_wire(&serial, now);
+                }
+            }
             Block::Tim1 => {
-                self.sync_wire(serial::CAPTURED, now);
-                for (at, rising) in self.usarts[0].take_edges() {
-                    self.tim1.capture_edge(serial::RX_CAPTURE, at, rising);
+                if let Some(serial) = self.places.captured() {
+                    self.sync_wire(&serial, now);
+                    for (at, rising) in self.usarts[0].take_edges() {
+                        self.tim1.capture_edge(serial::RX_CAPTURE, at, rising);
+                    }
                 }
                 self.tim1.advance(now);
             }
@@ -310,12 +325,13 @@ impl<C: Circuit> Soc<C> {
     fn note_due(&mut self, block: Block) {
         let next = match block {
             Block::Tim1 if self.tim1.capture_interrupt_enabled(serial::RX_CAPTURE) => {
-                let wire = self.circuit.wire(serial::CAPTURED.tx);
+                let serial = self.places.captured();
+                let wire = serial.and_then(|serial| self.circuit.wire(serial.tx));
                 let edge = wire.and_then(|wire| wire.next_edge());
                 [self.tim1.next_event(), edge].into_iter().flatten().min()
             }
-            _ => match SERIALS.iter().find(|serial| serial.usart == block) {
-                Some(serial) => self.next_exchange(serial),
+            _ => match self.places.0.iter().find(|serial| serial.usart == block) {
+                Some(&serial) => self.next_exchange(&serial),
                 None => self.block(block).next_event(),
             },
         };

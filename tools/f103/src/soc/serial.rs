@@ -4,7 +4,7 @@ use super::Soc;
 use super::circuit::{Circuit, PORTS, Pin};
 use super::map::Block;
 use crate::finding::What;
-use crate::periph::usart::{Usart, Wire};
+use crate::periph::usart::{TxPin, Usart, Wire};
 use crate::peripheral::Peripheral;
 use crate::time::Time;
 
@@ -18,65 +18,176 @@ const GPIO: [Block; PORTS] = [
 ];
 
 /// A USART and its pins, both on one port.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Serial {
     pub(super) usart: Block,
     pub(super) tx: Pin,
     rx: Pin,
     /// Finding when the receiver is on but the RX pin is not an input.
     no_input: &'static str,
+    /// Another USART was remapped to these pins: this one is connected to nothing.
+    pub(super) displaced: bool,
 }
 
 impl Serial {
+    const fn new(usart: Block, tx: Pin, rx: Pin, no_input: &'static str) -> Self {
+        Self {
+            usart,
+            tx,
+            rx,
+            no_input,
+            displaced: false,
+        }
+    }
+
     /// Returns the port of the USART's pins.
     pub(super) const fn port(&self) -> Block {
         GPIO[self.tx.port_index()]
     }
 }
 
-/// The USARTs that are modelled.
-pub(super) const SERIALS: [Serial; 4] = [
-    Serial {
-        usart: Block::Usart1,
-        tx: Pin::new('A', 9),
-        rx: Pin::new('A', 10),
-        no_input: "USART1 receives, but its RX pin is not a digital input",
-    },
-    Serial {
-        usart: Block::Usart2,
-        tx: Pin::new('A', 2),
-        rx: Pin::new('A', 3),
-        no_input: "USART2 receives, but its RX pin is not a digital input",
-    },
-    Serial {
-        usart: Block::Usart3,
-        tx: Pin::new('B', 10),
-        rx: Pin::new('B', 11),
-        no_input: "USART3 receives, but its RX pin is not a digital input",
-    },
-    Serial {
-        usart: Block::Uart4,
-        tx: Pin::new('C', 10),
-        rx: Pin::new('C', 11),
-        no_input: "UART4 receives, but its RX pin is not a digital input",
-    },
+/// Number of USARTs that are modelled.
+pub(super) const USARTS: usize = 4;
+
+/// The USARTs on the pins that they have after a reset (DS5319 table 5).
+const HOMES: [Serial; USARTS] = [
+    Serial::new(
+        Block::Usart1,
+        Pin::new('A', 9),
+        Pin::new('A', 10),
+        "USART1 receives, but its RX pin is not a digital input",
+    ),
+    Serial::new(
+        Block::Usart2,
+        Pin::new('A', 2),
+        Pin::new('A', 3),
+        "USART2 receives, but its RX pin is not a digital input",
+    ),
+    Serial::new(
+        Block::Usart3,
+        Pin::new('B', 10),
+        Pin::new('B', 11),
+        "USART3 receives, but its RX pin is not a digital input",
+    ),
+    Serial::new(
+        Block::Uart4,
+        Pin::new('C', 10),
+        Pin::new('C', 11),
+        "UART4 receives, but its RX pin is not a digital input",
+    ),
 ];
 
-/// The USART whose RX pin is also a channel of TIM1.
-pub(super) const CAPTURED: &Serial = &SERIALS[0];
-/// The channel of TIM1 at this pin.
+/// The remaps of USARTs (RM0008 9.3.8 and 9.4.2): number of the USART from 0, its field in AFIO_MAPR, the value of the
+/// field, TX and RX.
+const REMAPS: [(usize, u32, u32, Pin, Pin); 4] = [
+    (0, 1 << 2, 1 << 2, Pin::new('B', 6), Pin::new('B', 7)),
+    (1, 1 << 3, 1 << 3, Pin::new('D', 5), Pin::new('D', 6)),
+    (2, 3 << 4, 1 << 4, Pin::new('C', 10), Pin::new('C', 11)),
+    (2, 3 << 4, 3 << 4, Pin::new('D', 8), Pin::new('D', 9)),
+];
+
+/// On which pins each USART is now.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Places(pub(super) [Serial; USARTS]);
+
+impl Default for Places {
+    fn default() -> Self {
+        Self::of(0)
+    }
+}
+
+impl Places {
+    /// Returns the places for this value of AFIO_MAPR.
+    fn of(mapr: u32) -> Self {
+        let mut all = HOMES;
+        for (n, field, value, tx, rx) in REMAPS {
+            if mapr & field == value {
+                (all[n].tx, all[n].rx) = (tx, rx);
+            }
+        }
+        let [.., usart3, uart4] = &mut all;
+        uart4.displaced = usart3.tx == uart4.tx;
+        Self(all)
+    }
+
+    /// Returns the USART whose transmitter is at pin `tx`, and its number from 0.
+    fn at(&self, tx: Pin) -> Option<(usize, &Serial)> {
+        let mut all = self.0.iter().enumerate();
+        all.find(|(_, serial)| serial.tx == tx && !serial.displaced)
+    }
+
+    /// Returns USART1 while its RX pin is also a channel of TIM1.
+    pub(super) fn captured(&self) -> Option<Serial> {
+        Some(self.0[0]).filter(|serial| serial.rx == HOMES[0].rx)
+    }
+}
+
+/// Finding when a USART is remapped to pins that the part's package does not have.
+const NO_PINS: &str = "AFIO_MAPR puts a USART on pins that this part does not have";
+/// Finding when UART4 is on while it has no pins.
+const DISPLACED: &str = "UART4 is on, but USART3 is remapped to its pins";
+
+/// The channel of TIM1 at the RX pin of USART1.
 pub(super) const RX_CAPTURE: usize = 3;
 
 impl<C: Circuit> Soc<C> {
-    /// Returns the USART whose transmitter is at pin `tx`.
-    ///
-    /// # Panics
-    ///
-    /// If there is no such USART.
+    /// Returns the USART whose transmitter is at pin `tx`; one that is off if there is none.
     #[must_use]
     pub fn usart(&self, tx: Pin) -> &Usart {
-        let n = SERIALS.iter().position(|serial| serial.tx == tx);
-        &self.usarts[n.expect("a USART has its transmitter at this pin")]
+        match self.places.at(tx) {
+            Some((n, _)) => &self.usarts[n],
+            None => &self.absent,
+        }
+    }
+
+    /// Moves the USARTs to the pins that AFIO_MAPR gives them. Their wires have been computed up to `now`.
+    pub(super) fn place_usarts(&mut self, now: Time) {
+        let places = Places::of(self.afio.mapr());
+        let before = core::mem::replace(&mut self.places, places);
+        if before == places {
+            return;
+        }
+        for left in before.0 {
+            if places.at(left.tx).is_none()
+                && let Some(wire) = self.circuit.wire(left.tx)
+            {
+                wire.set_tx_pin(TxPin::Level(true), now);
+            }
+        }
+        for (serial, before) in places.0.iter().zip(before.0) {
+            if *serial == before {
+                continue;
+            }
+            let pins = self.part.ports[serial.tx.port_index()];
+            if [serial.tx, serial.rx].map(|pin| pins >> pin.number() & 1) != [1, 1] {
+                self.notes.push((now, What::Other(NO_PINS)));
+            }
+            let (usart, wire) = self.connection(serial);
+            let level = wire.is_none_or(|wire| {
+                wire.advance(now);
+                wire.take_edges();
+                wire.rx_level()
+            });
+            usart.receive_edge(now, level);
+            // No edge for a timer that captures the pin.
+            usart.take_edges();
+            self.drive_rx(serial, now);
+            self.note_due(serial.usart);
+        }
+        for port in 0..PORTS {
+            self.wire_gpio(port, now);
+        }
+    }
+
+    /// Computes the devices at pins that a USART has left up to `now`.
+    pub(super) fn sync_left_wires(&mut self, now: Time) {
+        for home in HOMES {
+            if self.places.at(home.tx).is_none()
+                && let Some(wire) = self.circuit.wire(home.tx)
+            {
+                self.absent.exchange(wire, now);
+            }
+        }
     }
 
     /// Returns a USART and the device that is connected to it.
@@ -87,7 +198,12 @@ impl<C: Circuit> Soc<C> {
             Block::Usart3 => 2,
             _ => 3,
         };
-        (&mut self.usarts[usart], self.circuit.wire(serial.tx))
+        let wire = if serial.displaced {
+            None
+        } else {
+            self.circuit.wire(serial.tx)
+        };
+        (&mut self.usarts[usart], wire)
     }
 
     /// Computes a USART and its wire up to `now`.
@@ -145,6 +261,10 @@ impl<C: Circuit> Soc<C> {
         let closed = (port.outputs() | port.analog()) >> serial.rx.number() & 1 != 0;
         let (usart, wire) = self.connection(serial);
         let connected = wire.is_some();
+        if serial.displaced && (usart.bit().is_some() || usart.awaits_start()) {
+            self.notes.push((now, What::Other(DISPLACED)));
+            return;
+        }
         if let Some(wire) = wire {
             usart.pass_sent(wire);
         }
@@ -155,7 +275,7 @@ impl<C: Circuit> Soc<C> {
 
     /// Drives the RX pin, for firmware that reads its level.
     pub(super) fn drive_rx(&mut self, serial: &Serial, now: Time) {
-        let Some(wire) = self.circuit.wire(serial.tx) else {
+        let (_, Some(wire)) = self.connection(serial) else {
             return;
         };
         let drive = wire.rx_drive();

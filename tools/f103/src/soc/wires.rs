@@ -1,14 +1,14 @@
-//! The wires between the blocks, and from the part's pins to the circuit. All blocks are on their default pins (DS5319
-//! table 5).
+//! The wires between the blocks, and from the part's pins to the circuit. All blocks but the USARTs
+//! ([`serial`](super::serial)) are on their default pins (DS5319 table 5).
 
 use super::Soc;
 use super::circuit::{Circuit, Pin};
 use super::map::Block;
-use super::serial::SERIALS;
 use crate::finding::What;
 use crate::periph::clocks::Clocks;
 use crate::periph::gpio::DebugPins;
 use crate::periph::i2c::NoDevice;
+use crate::periph::iwdg;
 use crate::periph::rcc::Cause;
 use crate::periph::usart::TxPin;
 use crate::peripheral::Peripheral;
@@ -30,7 +30,10 @@ impl<C: Circuit> Soc<C> {
             Block::GpioC => self.wire_gpio(2, now),
             Block::GpioD => self.wire_gpio(3, now),
             Block::GpioE => self.wire_gpio(4, now),
-            Block::Afio => self.wire_debug(now),
+            Block::Afio => {
+                self.wire_debug(now);
+                self.place_usarts(now);
+            }
             Block::Dac => self.wire_dac(now),
             Block::Dma1 => self.wire_dma(0, now),
             Block::Dma2 => self.wire_dma(1, now),
@@ -38,20 +41,20 @@ impl<C: Circuit> Soc<C> {
             Block::Flash => self.wire_flash(),
             Block::Iwdg => self.wire_watchdog(now),
             _ => {
-                if let Some(serial) = SERIALS.iter().find(|serial| serial.usart == block) {
-                    self.wire_usart(serial, now);
+                let mut serials = self.places.0.into_iter();
+                if let Some(serial) = serials.find(|serial| serial.usart == block) {
+                    self.wire_usart(&serial, now);
                 }
             }
         }
     }
 
     /// Passes the outputs of a port on to the wires and to the circuit.
-    fn wire_gpio(&mut self, port: usize, now: Time) {
+    pub(super) fn wire_gpio(&mut self, port: usize, now: Time) {
         let gpio = &self.gpio[port];
-        for serial in SERIALS
-            .iter()
-            .filter(|serial| serial.tx.port_index() == port)
-        {
+        let serials = self.places.0.into_iter();
+        let serials = serials.filter(|serial| serial.tx.port_index() == port && !serial.displaced);
+        for serial in serials.clone() {
             let tx = serial.tx.number();
             let pin = if gpio.alternate_outputs() >> tx & 1 != 0 {
                 TxPin::Usart
@@ -69,10 +72,7 @@ impl<C: Circuit> Soc<C> {
         if self.circuit.port_changed(name, &self.gpio[port], now) {
             self.refresh(now);
         }
-        for serial in SERIALS
-            .iter()
-            .filter(|serial| serial.tx.port_index() == port)
-        {
+        for serial in serials {
             self.note_due(serial.usart);
         }
         self.wire_port(port, now);
@@ -237,6 +237,9 @@ impl<C: Circuit> Soc<C> {
         if self.iwdg.running() {
             self.rcc.hold_lsi(now);
             self.wire_lsi(now);
+        }
+        if self.iwdg.take_stuck() {
+            self.notes.push((now, What::Other(iwdg::STUCK)));
         }
         if self.iwdg.take_reset_request() {
             self.signals.reset = Some(Cause::Iwdg);

@@ -145,6 +145,36 @@ fn a_fault_in_the_fault_handler_locks_up_the_core_and_time_passes() {
 }
 
 #[test]
+fn bkpt_is_a_hard_fault_that_is_reported_with_its_kind_and_its_address() {
+    for (code, what) in [(0xBEAB, "semihosting: BKPT 0xAB"), (0xBE00, "BKPT stops")] {
+        for process_stack in [false, true] {
+            let mut program = Asm::new();
+            if process_stack {
+                program.set(0, 0x2000_1000);
+                // MSR PSP, r0; MOV r0, #2; MSR CONTROL, r0; ISB.
+                for half in [0xF380, 0x8809, 0x2002, 0xF380, 0x8814, 0xF3BF, 0x8F6F] {
+                    program.raw(half);
+                }
+            }
+            let at = program.address();
+            program.raw(code);
+            program.spin();
+            program.handler(3);
+            program.store(OUT, 0xFA);
+            program.spin();
+            let mut chip = chip(program);
+            chip.run_until(Time::from_ms(5));
+            assert_eq!(out(&chip, 0), 0xFA);
+            let findings = chip.findings();
+            assert_eq!(findings.len(), 1, "{findings:?}");
+            assert_eq!(findings[0].pc, at);
+            let text = findings[0].what.to_string();
+            assert!(text.contains(what) && text.contains("hard fault"), "{text}");
+        }
+    }
+}
+
+#[test]
 fn deep_sleep_is_reported() {
     let mut program = Asm::new();
     program.store(0xE000_ED10, 4);

@@ -84,8 +84,8 @@ fn code_in_flash_stalls_for_the_whole_operation() {
     let read = [0, 1, 2, 3].map(|n| out(&chip, n));
     assert_eq!(
         read,
-        [0, 0x20, 0x20, 0x20],
-        "BSY is set late, then EOP is set and stays set"
+        [0, 0x20, 0x21, 0x20],
+        "BSY of an erase is set late, that of a half-word is not; EOP stays set"
     );
     assert_eq!(findings(&chip), [""; 0]);
 }

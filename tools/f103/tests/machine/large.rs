@@ -1,7 +1,7 @@
-//! What the parts of high density with 100 pins have beyond the others: UART4 with DMA2, ports D and E, the DAC; and
-//! the pins that every part shares with its debug port.
+//! What the parts of high density with 100 pins have beyond the others: UART4 with DMA2, ports D and E, the DAC, all
+//! remaps of USARTs; and the pins that every part shares with its debug port.
 
-use f103::part::STM32F103VC;
+use f103::part::{Part, STM32F103C8, STM32F103RC, STM32F103VC};
 use f103::periph::gpio::{Drive, Gpio};
 use f103::periph::usart::{Sent, Wire};
 use f103::serial::{Character, Format, Settings, Wave};
@@ -31,10 +31,15 @@ struct Bench {
     button: bool,
     dac: [Option<u16>; 2],
     debug: bool,
+    /// Transmitter of the USART at the wire, if it is not UART4. Then nothing else is connected.
+    tx: Option<Pin>,
 }
 
 impl Circuit for Bench {
     fn drive(&self, pins: &mut Pins) {
+        if self.tx.is_some() {
+            return;
+        }
         let button = if self.button {
             Drive::Low
         } else {
@@ -54,7 +59,7 @@ impl Circuit for Bench {
     }
 
     fn wire(&mut self, tx: Pin) -> Option<&mut dyn Wire> {
-        (tx == TX).then_some(self as &mut dyn Wire)
+        (tx == self.tx.unwrap_or(TX)).then_some(self as &mut dyn Wire)
     }
 }
 
@@ -95,8 +100,12 @@ impl Wire for Bench {
 }
 
 fn run(program: Asm, bench: Bench) -> Chip<Bench> {
+    run_on(&STM32F103VC, program, bench)
+}
+
+fn run_on(part: &'static Part, program: Asm, bench: Bench) -> Chip<Bench> {
     let config = chip::Config {
-        part: &STM32F103VC,
+        part,
         ..chip::Config::default()
     };
     let mut chip = Chip::in_circuit(&program.image(), config, bench).expect("the program fits");
@@ -304,4 +313,120 @@ fn pin_of_swclk_is_an_output_only_while_mapr_has_the_debug_port_off() {
     assert!(!low(Some(2), false), "SW-DP on");
     assert!(low(Some(4), false));
     assert!(!low(Some(4), true), "SWJ_CFG does not read back");
+}
+
+/// A USART at 9600 8N1 from 8 MHz: the USART, the bits of its clock in APB2ENR and APB1ENR, and BRR.
+const USARTS: [(u32, u32, u32); 3] = [
+    (USART1, 1 << 14, 0),
+    (USART2, 0, 1 << 17),
+    (USART3, 0, 1 << 18),
+];
+
+/// Sends a byte at USART `n` (from 1) and then waits for one, with this value of AFIO_MAPR and all pins of ports A to D
+/// as alternate outputs, except `rx`, which is a floating input.
+fn remapped(n: usize, mapr: u32, rx: Pin) -> Asm {
+    let (usart, apb2, apb1) = USARTS[n - 1];
+    let mut program = Asm::new();
+    program.store(RCC_APB2ENR, 0x3D | apb2);
+    program.store(RCC_APB1ENR, apb1);
+    program.store(AFIO + 4, mapr);
+    let port = GPIOA + 0x400 * (rx.port() as u32 - 'A' as u32);
+    for half in 0..2 {
+        let mut modes = 0xAAAA_AAAA;
+        if rx.number() as u32 / 8 == half {
+            let shift = 4 * (rx.number() % 8);
+            modes = modes & !(0xF << shift) | 4 << shift;
+        }
+        program.store(port + 4 * half, modes);
+    }
+    program.store(usart + 8, 833);
+    program.store(usart + 0x0C, 0x200C);
+    program.store(usart + 4, u32::from(b'!'));
+    program.wait_set(usart, 1 << 5);
+    program.copy(usart + 4, OUT);
+    program.spin();
+    program
+}
+
+/// Runs [`remapped`] with a wire at `tx` and the pin behind it, and sends a byte to the part.
+fn run_remapped(part: &'static Part, n: usize, mapr: u32, tx: Pin) -> Chip<Bench> {
+    let rx = Pin::new(tx.port(), tx.number() + 1);
+    let mut bench = Bench {
+        tx: Some(tx),
+        ..Bench::default()
+    };
+    let character = Character::new(LINE, b'?').at(Time::from_ms(7));
+    bench.input.push_character(&character);
+    bench.input.push(character.end(), true);
+    run_on(part, remapped(n, mapr, rx), bench)
+}
+
+#[test]
+fn remapped_usart_sends_and_receives_at_its_new_pins_and_not_at_the_old_ones() {
+    let pin = |port, number| Pin::new(port, number);
+    for (part, n, mapr, old, new) in [
+        (&STM32F103C8, 1, 1 << 2, pin('A', 9), pin('B', 6)),
+        (&STM32F103VC, 2, 1 << 3, pin('A', 2), pin('D', 5)),
+        (&STM32F103RC, 3, 1 << 4, pin('B', 10), pin('C', 10)),
+        (&STM32F103VC, 3, 3 << 4, pin('B', 10), pin('D', 8)),
+    ] {
+        for (mapr, tx, heard) in [(0, old, true), (mapr, new, true), (mapr, old, false)] {
+            // The low byte of MAPR with all pins of the debug port released, which are on ports A and B.
+            let chip = run_remapped(part, n, mapr | 4 << 24, tx);
+            let what = format!("USART{n} {mapr:#x} {tx:?}");
+            assert_eq!(findings(&chip), [""; 0], "{what}");
+            assert_eq!(chip.circuit().sent.len(), usize::from(heard), "{what}");
+            assert_eq!(out(&chip, 0) == u32::from(b'?'), heard, "{what}");
+        }
+    }
+}
+
+#[test]
+fn remap_to_missing_pins_and_remap_of_a_timer_are_findings() {
+    let at = Pin::new('C', 10);
+    for (part, mapr, what) in [
+        (&STM32F103C8, 1 << 4, "pins that this part does not have"),
+        (&STM32F103RC, 3 << 4, "pins that this part does not have"),
+        (&STM32F103RC, 1 << 3, "pins that this part does not have"),
+        (&STM32F103VC, 2 << 4, "pin remapping (AFIO_MAPR)"),
+        (&STM32F103VC, 1 << 4 | 1 << 8, "pin remapping (AFIO_MAPR)"),
+    ] {
+        let mut program = Asm::new();
+        program.store(RCC_APB2ENR, 1);
+        program.store(AFIO + 4, mapr);
+        program.copy(AFIO + 4, OUT);
+        program.spin();
+        let bench = Bench {
+            tx: Some(at),
+            ..Bench::default()
+        };
+        let found = findings(&run_on(part, program, bench));
+        assert_eq!(found.len(), 1, "{} {mapr:#x}: {found:?}", part.name);
+        assert!(
+            found[0].contains(what),
+            "{} {mapr:#x}: {found:?}",
+            part.name
+        );
+    }
+}
+
+#[test]
+fn uart4_has_no_pins_while_usart3_is_at_them() {
+    let mut program = uart4();
+    program.store(RCC_APB2ENR, 1 << 4 | 1);
+    for mapr in [0, 1 << 4, 0] {
+        program.store(AFIO + 4, mapr);
+        // Reading SR before writing DR clears TC.
+        program.copy(UART4, OUT);
+        program.store(UART4 + 4, u32::from(b'!'));
+        program.wait_set(UART4, 1 << 6);
+    }
+    program.spin();
+    let chip = run(program, Bench::default());
+    assert_eq!(chip.circuit().sent.len(), 2);
+    let findings = findings(&chip);
+    assert!(!findings.is_empty());
+    for found in findings {
+        assert!(found.contains("USART3 is remapped to its pins"), "{found}");
+    }
 }

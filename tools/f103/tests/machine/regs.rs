@@ -19,6 +19,7 @@ pub const GPIOB: u32 = 0x4001_0C00;
 pub const GPIOC: u32 = 0x4001_1000;
 pub const TIM2: u32 = 0x4000_0000;
 pub const USART1: u32 = 0x4001_3800;
+pub const USART2: u32 = 0x4000_4400;
 pub const USART3: u32 = 0x4000_4800;
 pub const GPIOD: u32 = 0x4001_1400;
 pub const GPIOE: u32 = 0x4001_1800;

@@ -44,6 +44,9 @@ fn watchdog_settings_are_not_in_force_while_the_lsi_is_off() {
     let mut chip = chip(program);
     chip.run_until(Time::from_ms(20));
     assert_eq!([out(&chip, 0), out(&chip, 1)], [1, 0]);
+    let findings = findings(&chip);
+    assert_eq!(findings.len(), 1, "{findings:?}");
+    assert!(findings[0].contains("while the LSI is off"), "{findings:?}");
 }
 
 #[test]

@@ -63,6 +63,8 @@ pub struct Line {
     /// The TX pin as the unit's USART drives it.
     usart: Wave,
     last_sent: Option<Span>,
+    /// A character that has begun, or begins soon, and that the driver or the TX pin keeps from the bus so far.
+    unheard: Option<Character>,
     tx_pin: TxPin,
     driver: bool,
     echo: bool,
@@ -95,6 +97,7 @@ impl Default for Line {
             noise: Wave::default(),
             usart: Wave::default(),
             last_sent: None,
+            unheard: None,
             tx_pin: TxPin::Level(true),
             driver: false,
             echo: false,

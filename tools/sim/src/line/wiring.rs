@@ -5,6 +5,25 @@ use f103::periph::usart::{Sent, TxPin, Usart, Wire};
 use f103::serial::{Framing, Wave, Word};
 use f103::time::Time;
 
+/// What keeps the USART's characters from the bus, with the findings: it lasted for a whole character, it ended in the
+/// middle of one, or it ended in the first half of a start bit, so that the character arrived.
+struct Obstacle {
+    lost: &'static str,
+    middle: &'static str,
+    late: &'static str,
+}
+
+const DRIVER_OFF: Obstacle = Obstacle {
+    lost: "the USART sent a character while the RS-485 driver was off: it is lost",
+    middle: "the RS-485 driver was switched on in the middle of a character",
+    late: "the USART began to send before the RS-485 driver was on: the start bit is too short",
+};
+const NO_PIN: Obstacle = Obstacle {
+    lost: "the USART sent a character while its TX pin was not an alternate function",
+    middle: "the TX pin became an alternate function in the middle of a character",
+    late: "the USART began to send before its TX pin was an alternate function: the start bit is too short",
+};
+
 impl Wire for Line {
     fn sent(&mut self, sent: Sent) {
         self.put(sent);
@@ -15,6 +34,7 @@ impl Wire for Line {
             let now = now.max(self.now);
             self.extend(now);
             self.tx_pin = pin;
+            self.connected(&NO_PIN, now);
             self.shared.changed = true;
             self.settle(now);
         }
@@ -79,20 +99,13 @@ impl Line {
         }
         let now = now.max(self.now);
         self.extend(now);
-        if self
-            .last_sent
-            .is_some_and(|span| span.start <= now && now < span.end)
-        {
-            self.findings.push((
-                now,
-                if on {
-                    "the RS-485 driver was switched on in the middle of a character"
-                } else {
-                    "the RS-485 driver was switched off before the end of the last stop bit"
-                },
-            ));
+        let sends = |span: Span| span.start <= now && now < span.end;
+        if !on && self.last_sent.is_some_and(sends) {
+            let text = "the RS-485 driver was switched off before the end of the last stop bit";
+            self.findings.push((now, text));
         }
         self.driver = on;
+        self.connected(&DRIVER_OFF, now);
         self.shared.switched(now, on);
         keep(&mut self.driver_edges, (now, on));
         self.settle(now);
@@ -101,6 +114,7 @@ impl Line {
     /// Switches the unit's driver off because it has no supply any more, which the firmware cannot prevent.
     pub fn power_off(&mut self, now: Time) {
         self.last_sent = None;
+        self.unheard = None;
         self.set_driver(false, now);
     }
 
@@ -117,27 +131,60 @@ impl Line {
         self.driver
     }
 
+    /// Returns what keeps the USART's characters from the bus.
+    fn obstacle(&self) -> Option<&'static Obstacle> {
+        if self.tx_pin != TxPin::Usart {
+            Some(&NO_PIN)
+        } else if !self.driver {
+            Some(&DRIVER_OFF)
+        } else {
+            None
+        }
+    }
+
+    /// Reports the part of a character that was kept from the bus, if `obstacle` has ended at `now` as the last one.
+    fn connected(&mut self, obstacle: &Obstacle, now: Time) {
+        if self.obstacle().is_some() {
+            return;
+        }
+        let unheard = self.unheard.take();
+        // Nothing was missing of a character that begins now or later.
+        if self
+            .last_sent
+            .is_none_or(|span| now <= span.start || span.end <= now)
+        {
+            return;
+        }
+        let is_late = unheard.is_some_and(|character| (now - character.start) * 2 < character.bit);
+        let text = if is_late {
+            obstacle.late
+        } else {
+            obstacle.middle
+        };
+        self.findings.push((now, text));
+    }
+
+    /// Reports a character that has ended by `now` and was kept from the bus for all of its time.
+    fn report_lost(&mut self, now: Time) {
+        let ended = self.last_sent.is_some_and(|span| span.end <= now);
+        if let Some(character) = self.unheard.take_if(|_| ended) {
+            let obstacle = self.obstacle().unwrap_or(&DRIVER_OFF);
+            self.findings.push((character.start, obstacle.lost));
+        }
+    }
+
     /// Takes over the output of the unit's USART at its TX pin.
     fn put(&mut self, sent: Sent) {
         self.shared.changed = true;
         sent.put_on(&mut self.usart);
         match sent {
             Sent::Character(character) => {
+                self.report_lost(character.start);
                 self.last_sent = Some(Span {
                     start: character.start,
                     end: character.end(),
                 });
-                if self.tx_pin != TxPin::Usart {
-                    self.findings.push((
-                        character.start,
-                        "the USART sent a character while its TX pin was not an alternate function",
-                    ));
-                } else if !self.driver {
-                    self.findings.push((
-                        character.start,
-                        "the USART sent a character while the RS-485 driver was off: it is lost",
-                    ));
-                }
+                self.unheard = self.obstacle().map(|_| character);
             }
             Sent::Cut(at) => {
                 if let Some(span) = &mut self.last_sent {
@@ -165,6 +212,7 @@ impl Line {
             self.settle(at);
         }
         self.now = self.now.max(to);
+        self.report_lost(self.now);
     }
 
     /// Computes the levels at `at`. No later instant is known.

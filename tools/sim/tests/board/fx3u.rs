@@ -75,26 +75,38 @@ fn firmware_that_leaves_the_driver_on_is_a_finding_and_collides_with_the_master(
 
 #[test]
 fn byte_is_sent_back_at_uart4_and_at_the_rs232_port() {
+    check_both_ports(UART4, 1 << 19, 4 << 24);
+}
+
+#[test]
+fn firmware_that_remaps_usart3_to_the_pins_of_the_line_uses_the_line() {
+    check_both_ports(USART3, 1 << 18, 4 << 24 | 1 << 4);
+}
+
+/// Sends a byte in each direction at the line and at the RS-232 port. The firmware uses this USART for the line, with
+/// this bit of its clock and this value of AFIO_MAPR.
+fn check_both_ports(line: u32, clock: u32, mapr: u32) {
     let mut program = set_up();
     release_line(&mut program);
     program.store(RCC_APB2ENR, 0x407D);
-    program.store(RCC_APB1ENR, 1 << 19);
+    program.store(RCC_APB1ENR, clock);
+    program.store(AFIO + 4, mapr);
     // PC10 and PA9 are alternate outputs.
     program.store(GPIOC + 4, 0x4444_4B44);
     program.store(GPIOA + 4, 0x4244_44B4);
-    for usart in [UART4, USART1] {
+    for usart in [line, USART1] {
         program.store(usart + 8, 833);
         program.store(usart + 0x0C, 0x200C);
     }
     program.store(GPIOA + 0x10, 1 << 14);
-    for usart in [UART4, USART1] {
+    for usart in [line, USART1] {
         // Reading SR before writing DR clears TC.
         program.copy(usart, OUT);
         program.store(usart + 4, u32::from(b'!'));
         program.wait_set(usart, 1 << 6);
     }
     program.store(GPIOA + 0x14, 1 << 14);
-    for (usart, n) in [(UART4, 0), (USART1, 1)] {
+    for (usart, n) in [(line, 0), (USART1, 1)] {
         program.wait_set(usart, 1 << 5);
         program.copy(usart + 4, OUT + 4 * n);
     }

@@ -109,9 +109,8 @@ pub struct Flash {
     busy: Option<Busy>,
     /// Instructions left in the prefetch buffer. The core stalls only after it has run them.
     ahead: u32,
-    /// BSY still reads 0 although an operation runs: it rises a cycle late (errata sheet of the STM32F10xx4 and
-    /// STM32F10xx6, 2.11 "Flash memory BSY bit delay versus STRT bit setting"). The errata sheet says so for an
-    /// erase; the model also applies it to this part and to a half-word. In the worst case, modelled here, BSY reads
+    /// BSY still reads 0 although an erase runs: it rises a cycle after STRT (errata sheet ES096 of the medium-density
+    /// parts, 2.2.8), of which a half-word has none. The model applies it to all parts, in its worst case: BSY reads
     /// 0 until the first read of a register of this block, or until the core stalls.
     bsy_is_late: bool,
     /// Number of the operation that is to end without EOP, counted like `started`.

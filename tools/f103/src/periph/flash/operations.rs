@@ -60,14 +60,14 @@ impl Flash {
             });
             return;
         }
-        let lasts = match operation {
-            Operation::Program { .. } => self.durations.program,
-            Operation::Page { .. } | Operation::Mass => self.durations.erase,
+        let (lasts, is_erase) = match operation {
+            Operation::Program { .. } => (self.durations.program, false),
+            Operation::Page { .. } | Operation::Mass => (self.durations.erase, true),
         };
         self.started += 1;
         self.sr |= SR_BSY;
         self.ahead = FETCHED_AHEAD;
-        self.bsy_is_late = true;
+        self.bsy_is_late = is_erase;
         self.busy = Some(Busy {
             operation,
             from: now,

@@ -36,8 +36,7 @@ fn program(flash: &mut Flash, offset: u32, value: u16) {
 fn half_word_is_stored_after_the_program_time() {
     let mut flash = open();
     program(&mut flash, 0x400, 0x1234);
-    assert_eq!(flash.read(0x0C, NOW), Ok(0), "BSY is late");
-    assert_eq!(flash.read(0x0C, NOW), Ok(SR_BSY));
+    assert_eq!(flash.read(0x0C, NOW), Ok(SR_BSY), "at the first read");
     assert_eq!(flash.bytes()[0x400], 0xFF);
     let end = flash.next_event().unwrap();
     assert_eq!(end, Time::from_ns(52_500));
@@ -49,20 +48,44 @@ fn half_word_is_stored_after_the_program_time() {
 }
 
 #[test]
-fn bsy_is_late_for_one_read_and_fetches_stall_after_the_prefetched_instructions() {
+fn bsy_of_an_erase_is_late_for_one_read_and_fetches_stall_after_the_prefetched_instructions() {
     let mut flash = open();
-    program(&mut flash, 0, 0);
-    assert_eq!(flash.read(0x10, NOW), Ok(CR_PG), "any register");
+    erase(&mut flash, 0, NOW);
+    assert_eq!(flash.read(0x10, NOW), Ok(CR_PER | CR_STRT), "any register");
     assert_eq!(flash.read(0x0C, NOW), Ok(SR_BSY));
     flash.ran(u64::from(FETCHED_AHEAD) - 1);
     assert_eq!(flash.stalled_until(), None);
     flash.ran(1);
     assert_eq!(flash.stalled_until(), flash.busy_until());
-    flash.advance(Time::from_ms(1));
-    program(&mut flash, 2, 0);
+    let later = Time::from_ms(50);
+    flash.advance(later);
+    flash.write(0x0C, SR_EOP, later).unwrap();
+    erase(&mut flash, 0, later);
+    assert_eq!(flash.read(0x0C, later), Ok(0), "late");
+    assert_eq!(flash.read(0x0C, later), Ok(SR_BSY));
+    let later = Time::from_ms(100);
+    flash.advance(later);
+    flash.write(0x0C, SR_EOP, later).unwrap();
+    erase(&mut flash, 0, later);
     flash.ran(u64::from(FETCHED_AHEAD));
-    flash.write(0x0C, SR_EOP, NOW).unwrap();
-    assert_eq!(flash.read(0x0C, NOW), Ok(SR_BSY), "no longer late");
+    assert_eq!(flash.read(0x0C, later), Ok(SR_BSY), "no longer late");
+}
+
+#[test]
+fn program_that_takes_a_late_bsy_for_the_end_clears_per_and_locks_without_effect() {
+    let mut flash = open();
+    erase(&mut flash, 0x400, NOW);
+    assert_eq!(flash.read(0x0C, NOW), Ok(0), "late");
+    for clears in [0, CR_LOCK] {
+        flash.write(0x10, clears, NOW).unwrap();
+        let text = flash.take_complaint().unwrap().text;
+        assert!(text.contains("while an operation runs"), "{text}");
+    }
+    assert_eq!(flash.read(0x10, NOW), Ok(CR_PER | CR_STRT));
+    let end = Time::from_ms(30);
+    flash.advance(end);
+    assert_eq!(flash.take_changed(), Some((0x400, 0x800)));
+    assert_eq!(flash.read(0x10, end), Ok(CR_PER), "still open");
 }
 
 #[test]

@@ -260,7 +260,7 @@ impl Rcc {
         self.is_ready(self.pll) || self.pll.is_none() && self.now < self.pll_stops
     }
 
-    fn write_cr(&mut self, value: u32, now: Time) {
+    fn write_cr(&mut self, value: u32, now: Time) -> Result<(), Unmodelled> {
         let mut cr = value & (CR_HSION | CR_HSITRIM | CR_HSEON | CR_HSEBYP | CR_CSSON | CR_PLLON);
         // An oscillator that feeds the system clock cannot be stopped (RM0008 7.3.1).
         if self.sws == 0 || (self.sws == 2 && !self.pll_from_hse()) {
@@ -282,19 +282,30 @@ impl Rcc {
         if cr & CR_PLLON == 0 && self.is_ready(self.pll) {
             self.pll_stops = now + PLL_STOP;
         }
+        let was_off = self.pll.is_none();
         self.pll = start(self.pll, cr & CR_PLLON != 0, self.pll_lock(now));
         // The detector acts when the HSE is ready (RM0008 7.3.1).
         self.cr = cr;
+        if was_off && self.pll.is_some() && self.pll_source().is_none() {
+            return Err(Unmodelled(
+                "the PLL was switched on while its source, the HSE, is off: PLLRDY is never set",
+            ));
+        }
+        Ok(())
     }
 
     /// Returns the instant at which a PLL that is switched on now locks; its source has to run first.
     fn pll_lock(&self, now: Time) -> Time {
-        let source = if self.pll_from_hse() {
+        self.pll_source()
+            .map_or(Time::MAX, |ready| ready.max(now) + PLL_LOCK)
+    }
+
+    fn pll_source(&self) -> Ready {
+        if self.pll_from_hse() {
             self.hse
         } else {
             self.hsi
-        };
-        source.map_or(Time::MAX, |ready| ready.max(now) + PLL_LOCK)
+        }
     }
 
     fn write_cfgr(&mut self, value: u32) -> Result<(), Unmodelled> {
@@ -316,6 +327,11 @@ impl Rcc {
         if sets_pll && self.pll_is_ready() {
             return Err(Unmodelled(
                 "RCC_CFGR's PLL bits written while PLLRDY is set",
+            ));
+        }
+        if value & CFGR_SW != self.sws && self.wanted().is_none() {
+            return Err(Unmodelled(
+                "RCC_CFGR.SW selects a clock that is off: SWS does not follow",
             ));
         }
         Ok(())

@@ -24,7 +24,7 @@ impl Peripheral for Rcc {
 
     fn write(&mut self, offset: u32, value: u32, now: Time) -> Result<(), Unmodelled> {
         match offset {
-            0x00 => self.write_cr(value, now),
+            0x00 => return self.write_cr(value, now),
             0x04 => {
                 let written = self.write_cfgr(value);
                 self.switch();

@@ -159,3 +159,17 @@ fn pll_settings_written_before_pllrdy_has_fallen_are_refused() {
     assert_eq!(rcc.read(0, now).unwrap() & CR_PLLRDY, 0);
     assert_eq!(rcc.write(4, 0x0015_0400, now), Ok(()));
 }
+
+#[test]
+fn pll_without_its_source_and_switch_to_a_clock_that_is_off_are_refused() {
+    let mut rcc = Rcc::new(true, Oscillators::TYPICAL, STM32F103CB.clock_enables);
+    let now = at(&mut rcc, 10);
+    assert!(rcc.write(4, 1, now).is_err(), "the HSE is off");
+    assert!(rcc.write(4, 0x001D_0402, now).is_err(), "the PLL is off");
+    rcc.write(4, 0x001D_0400, now).unwrap();
+    assert!(rcc.write(0, 0x0100_0083, now).is_err(), "the HSE is off");
+    rcc.write(0, 0x83, now).unwrap();
+    // Both at once: the PLL waits for the crystal.
+    rcc.write(0, 0x0101_0083, now).unwrap();
+    rcc.write(4, 0x001D_0402, now).unwrap();
+}

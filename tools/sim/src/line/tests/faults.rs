@@ -12,6 +12,66 @@ fn character_sent_with_the_driver_off_is_lost_and_reported() {
     let findings = bench.line.take_findings();
     assert_eq!(findings.len(), 1);
     assert_eq!(findings[0].0, TICK);
+    assert!(findings[0].1.ends_with("it is lost"));
+}
+
+#[test]
+fn character_that_begins_before_the_driver_is_on_is_reported_as_what_became_of_it() {
+    // When the driver is switched on, in sixteenths of a bit; the byte that the master receives; the finding.
+    for (sixteenths, byte, what) in [
+        (0, Some(0x55), None),
+        (
+            1,
+            Some(0x55),
+            Some("began to send before the RS-485 driver was on"),
+        ),
+        (
+            7,
+            Some(0x55),
+            Some("began to send before the RS-485 driver was on"),
+        ),
+        // Data bit 0 is high: the receiver takes bit 1 for the start bit.
+        (9, Some(0xD5), Some("in the middle of a character")),
+        (16 * 11 - 1, None, Some("in the middle of a character")),
+        (16 * 11, None, Some("it is lost")),
+    ] {
+        let mut bench = Bench::new();
+        bench.write(DR, 0x55);
+        bench.run_to(TICK + Time::cycles(625 * sixteenths / 16, HZ));
+        bench.driver(true);
+        bench.run_to(Time::from_ms(5));
+        let received = bench.line.received().map(|received| received.byte).next();
+        assert_eq!(received, byte, "{sixteenths}");
+        let findings = bench.line.take_findings();
+        assert_eq!(findings.len(), usize::from(what.is_some()), "{findings:?}");
+        if let Some(what) = what {
+            assert!(findings[0].1.contains(what), "{findings:?}");
+        }
+    }
+}
+
+#[test]
+fn character_is_reported_as_begun_before_its_pin_only_if_it_was() {
+    for (sixteenths, what) in [
+        (0, None),
+        (1, Some("began to send before its TX pin")),
+        (16 * 5, Some("in the middle of a character")),
+        (16 * 11, Some("while its TX pin was not")),
+    ] {
+        let mut bench = Bench::new();
+        bench.driver(true);
+        bench.line.set_tx_pin(TxPin::Level(true), bench.now);
+        bench.write(DR, 0x55);
+        bench.run_to(TICK + Time::cycles(625 * sixteenths / 16, HZ));
+        bench.line.set_tx_pin(TxPin::Usart, bench.now);
+        bench.run_to(Time::from_ms(5));
+        let findings = bench.line.take_findings();
+        let texts: Vec<_> = findings.iter().map(|(_, text)| *text).collect();
+        match what {
+            None => assert_eq!(texts, [""; 0]),
+            Some(what) => assert!(texts.len() == 1 && texts[0].contains(what), "{texts:?}"),
+        }
+    }
 }
 
 #[test]
