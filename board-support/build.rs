@@ -6,12 +6,14 @@ use std::{env, fs, path::PathBuf};
 
 use register_map::{
     Board,
-    layout::{HEADER, LOADER},
+    layout::{HEADER, LOADER, LOADER_KEYS},
     part::{FLASH_BASE, RAM_BASE},
 };
 
 /// The sections, which are the same in every image.
 const SECTIONS: &str = "memory/sections.x";
+/// The section with the numbers of the loader's keys.
+const KEYS: &str = "SECTIONS { .keys : { KEEP(*(.keys)) } > KEYS } INSERT AFTER .rodata;\n";
 /// Bytes of the kept region, at the end of the RAM.
 const KEPT: u32 = 512;
 /// Bytes of the loader's variables. The check of a signature needs more stack than the application has.
@@ -73,7 +75,7 @@ fn memory(board: &Board) -> String {
         )
     };
     let (origin, length, store) = if is_on("loader") {
-        (FLASH_BASE, LOADER, layout.store)
+        (FLASH_BASE, LOADER_KEYS - FLASH_BASE, layout.store)
     } else if is_on("slot-a") {
         slot(0)
     } else if is_on("slot-b") {
@@ -82,6 +84,8 @@ fn memory(board: &Board) -> String {
         (FLASH_BASE, board.store.first - FLASH_BASE, board.store)
     };
     let sections = fs::read_to_string(SECTIONS).expect("the linker script is readable");
+    let keys_bytes = FLASH_BASE + LOADER - LOADER_KEYS;
+    let keys = if is_on("loader") { KEYS } else { "" };
     format!(
         "/* Memory of the {board}. */
 MEMORY
@@ -90,15 +94,17 @@ MEMORY
   STACK : ORIGIN = {RAM_BASE:#X}, LENGTH = {stack}
   RAM   : ORIGIN = {RAM_BASE:#X} + {stack}, LENGTH = {variables}
   KEPT  : ORIGIN = {RAM_BASE:#X} + {kept}, LENGTH = {KEPT}
+  KEYS  : ORIGIN = {LOADER_KEYS:#X}, LENGTH = {keys_bytes}
 }}
 _slot_a = {a:#X};
 _slot_b = {b:#X};
 _slot_bytes = {slot};
 _boot = {boot:#X};
+_loader_keys = {LOADER_KEYS:#X};
 _store = {store:#X};
 _page_bytes = {page};
 VECTORS_SIZE = {vectors};
-{sections}",
+{sections}{keys}",
         a = layout.slots[0],
         b = layout.slots[1],
         slot = layout.slot,

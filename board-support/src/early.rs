@@ -6,7 +6,7 @@ use stm32f1xx_hal::{
 };
 
 use crate::{
-    boards::BOARD,
+    boards::{BOARD, Held},
     pin::{Mode, Port},
 };
 
@@ -25,9 +25,12 @@ unsafe extern "C" fn __pre_init() {
     let (mut rcc, afio) = unsafe { (pac::RCC::steal(), pac::AFIO::steal()) };
     ports_on(&mut rcc);
     write_mapr(&mut rcc, &afio);
-    for (pin, high) in BOARD.held {
-        pin.set(*high);
-        pin.configure(Mode::Output);
+    for (pin, held) in BOARD.held {
+        pin.set(matches!(held, Held::High));
+        pin.configure(match held {
+            Held::Low | Held::High => Mode::Output,
+            Held::PulledDown => Mode::Pulled,
+        });
     }
 }
 

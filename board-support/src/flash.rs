@@ -247,6 +247,8 @@ unsafe extern "C" {
     static _store: u8;
     /// The first page of the boot state. The second one follows.
     static _boot: u8;
+    /// The numbers of the loader's keys, its last bytes.
+    static _loader_keys: [u8; 16];
     /// Its address is the number of bytes of a page.
     static _page_bytes: u8;
     static _slot_a: u8;
@@ -380,6 +382,13 @@ impl Flash {
     pub fn running_slot() -> Option<&'static [u8]> {
         // SAFETY: the program never changes the slot that it runs from.
         crate::SLOT.map(|slot| unsafe { slot_bytes(slot) })
+    }
+
+    /// Returns the last bytes of the loader, which have the numbers of its keys.
+    #[must_use]
+    pub fn loader_keys() -> &'static [u8; 16] {
+        // SAFETY: the linker's script has this symbol at 16 bytes of the flash, which the program never changes.
+        unsafe { &_loader_keys }
     }
 }
 

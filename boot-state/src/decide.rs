@@ -2,23 +2,23 @@
 
 use register_map::update::{Reason, Slot, State, TRIALS};
 
-use crate::Record;
+use crate::{Image, Record};
 
 /// What the loader needs of the part.
 pub trait Part {
     /// Returns whether a slot holds an image whose magic number, bounds, zero bytes and CRC-32 are right.
     fn is_intact(&mut self, slot: Slot) -> bool;
 
-    /// Returns the security epoch in the header of an intact image.
-    fn epoch(&mut self, slot: Slot) -> u16;
+    /// Returns what the header of an intact image says.
+    fn image(&mut self, slot: Slot) -> Image;
 
     /// Checks that the image in a slot is genuine: for this board and this slot, not below the floor, with the right
-    /// hash and signature.
+    /// hash and the signature of a key that is not `revoked`.
     ///
     /// # Errors
     ///
     /// What is wrong with it.
-    fn check(&mut self, slot: Slot, floor: u16) -> Result<(), Reason>;
+    fn check(&mut self, slot: Slot, floor: u16, revoked: bool) -> Result<(), Reason>;
 
     /// Writes the boot state.
     ///
@@ -84,18 +84,28 @@ pub fn decide(part: &mut impl Part, record: Option<Record>, start: Start) -> Nex
     }
 }
 
-/// Step 1, without a boot state: the first genuine image is confirmed. When the record cannot be written, the image is
-/// started all the same, and found again at the next start.
+/// Step 1, without a boot state: a genuine image is confirmed. One by the second key comes before one by the first, then
+/// the higher epoch counts, then slot A. So the first key stays revoked while an image by the second is left. When the
+/// record cannot be written, the image is started all the same, and found again at the next start.
 fn first(part: &mut impl Part) -> Next {
-    let genuine = |slot: &Slot| part.is_intact(*slot) && part.check(*slot, 0).is_ok();
-    let Some(slot) = Slot::ALL.into_iter().find(genuine) else {
+    let [a, b] = Slot::ALL.map(|slot| {
+        let image = part.is_intact(slot).then(|| part.image(slot));
+        image.map(|image| (image.by_second, image.epoch))
+    });
+    // What a header says of itself, the check finds true or refuses.
+    let slots = if b > a { [Slot::B, Slot::A] } else { Slot::ALL };
+    let genuine = |slot: &Slot| part.is_intact(*slot) && part.check(*slot, 0, false).is_ok();
+    let Some(slot) = slots.into_iter().find(genuine) else {
         return Next::Nothing;
     };
-    let record = Record {
+    let image = part.image(slot);
+    let mut record = Record {
         preferred: slot,
         states: [State::Empty; 2],
-        floor: part.epoch(slot),
+        floor: 0,
+        bits: 0,
     };
+    record.prefer(slot, image);
     match part.write(record.with(slot, State::Confirmed)) {
         Ok(()) => Next::Reset,
         Err(Unwritten) => Next::Run {
@@ -115,7 +125,7 @@ fn checked(part: &mut impl Part, record: &mut Record) -> Result<bool, Unwritten>
     for slot in Slot::ALL {
         if record.state(slot) == State::New {
             put(part, record, slot, State::Checking)?;
-            let verdict = match part.check(slot, record.floor) {
+            let verdict = match part.check(slot, record.floor, record.is_revoked()) {
                 Ok(()) => State::Trial(0),
                 Err(reason) => State::Rejected(reason),
             };
@@ -133,7 +143,7 @@ fn chosen(part: &mut impl Part, record: &Record, start: Start) -> Option<Slot> {
     let slot = start.chosen.or(other)?;
     let may = record.state(slot) == State::Confirmed
         && part.is_intact(slot)
-        && part.epoch(slot) >= record.floor;
+        && record.allows(part.image(slot));
     may.then_some(slot)
 }
 
@@ -161,7 +171,7 @@ fn on_trial(
     Ok(None)
 }
 
-/// Steps 6 and 7: the preferred slot, else the other one, whatever its epoch.
+/// Steps 6 and 7: the preferred slot, else the other one, whatever its epoch and its key.
 fn preferred(part: &mut impl Part, record: &Record) -> Next {
     let slots = [record.preferred, record.preferred.other()];
     let may = |slot: &Slot| record.state(*slot) == State::Confirmed && part.is_intact(*slot);
@@ -194,13 +204,16 @@ mod tests {
     use super::*;
     use State::{Checking, Confirmed, Empty, New, Rejected, Trial};
 
-    /// A part whose slots hold genuine images of epochs 3 and 4, except where a field says otherwise.
+    /// A part whose slots hold genuine images of epochs 3 and 4 by the first key, except where a field says otherwise.
     #[derive(Default)]
     struct Genuine {
         damaged: Option<Slot>,
         forged: Option<Slot>,
         refuses: bool,
+        /// The slot whose image the second key signed.
+        by_second: Option<Slot>,
         written: Vec<[State; 2]>,
+        last: Option<Record>,
     }
 
     impl Part for Genuine {
@@ -208,12 +221,15 @@ mod tests {
             self.damaged != Some(slot)
         }
 
-        fn epoch(&mut self, slot: Slot) -> u16 {
-            3 + slot as u16
+        fn image(&mut self, slot: Slot) -> Image {
+            Image {
+                epoch: 3 + slot as u16,
+                by_second: self.by_second == Some(slot),
+            }
         }
 
-        fn check(&mut self, slot: Slot, _: u16) -> Result<(), Reason> {
-            if self.forged == Some(slot) {
+        fn check(&mut self, slot: Slot, _: u16, revoked: bool) -> Result<(), Reason> {
+            if self.forged == Some(slot) || revoked && self.by_second != Some(slot) {
                 Err(Reason::Signature)
             } else {
                 Ok(())
@@ -225,16 +241,27 @@ mod tests {
                 return Err(Unwritten);
             }
             self.written.push(record.states);
+            self.last = Some(record);
             Ok(())
         }
     }
 
     /// Returns what a start does with these states, with A preferred and floor 4, and the states that it writes.
-    fn start(mut part: Genuine, states: [State; 2], start: Start) -> (Next, Vec<[State; 2]>) {
+    fn start(part: Genuine, states: [State; 2], start: Start) -> (Next, Vec<[State; 2]>) {
+        start_with(part, states, start, 0)
+    }
+
+    fn start_with(
+        mut part: Genuine,
+        states: [State; 2],
+        start: Start,
+        bits: u8,
+    ) -> (Next, Vec<[State; 2]>) {
         let record = Record {
             preferred: Slot::A,
             states,
             floor: 4,
+            bits,
         };
         let next = decide(&mut part, Some(record), start);
         (next, part.written)
@@ -315,6 +342,61 @@ mod tests {
         };
         let next = start(Genuine::default(), [Confirmed; 2], below);
         assert_eq!(next, (run(Slot::A), vec![]));
+    }
+
+    #[test]
+    fn revoked_key_signs_nothing_new_and_is_not_chosen_but_starts_as_the_last_resort() {
+        let revoked = Record::FIRST_KEY_REVOKED;
+        let with = |part, states, how| start_with(part, states, how, revoked);
+        let rejected = [Confirmed, Rejected(Reason::Signature)];
+        assert_eq!(
+            with(Genuine::default(), [Confirmed, New], Start::default()),
+            (Next::Reset, vec![[Confirmed, Checking], rejected])
+        );
+        let switched = Start {
+            switched: true,
+            ..Start::default()
+        };
+        let by_second = |slot| Genuine {
+            by_second: Some(slot),
+            ..Genuine::default()
+        };
+        let next = with(by_second(Slot::A), [Confirmed; 2], switched);
+        assert_eq!(next, (run(Slot::A), vec![]));
+        let next = with(by_second(Slot::B), [Confirmed; 2], switched);
+        let chosen = Next::Run {
+            slot: Slot::B,
+            chosen: true,
+        };
+        assert_eq!(next, (chosen, vec![]));
+        let last = Genuine {
+            damaged: Some(Slot::A),
+            ..Genuine::default()
+        };
+        let next = with(last, [Confirmed; 2], Start::default());
+        assert_eq!(next, (run(Slot::B), vec![]));
+    }
+
+    #[test]
+    fn first_start_takes_the_second_key_then_the_higher_epoch() {
+        for (by_second, slot, floor, bits) in [
+            (None, Slot::B, 4, 0),
+            (Some(Slot::A), Slot::A, 3, Record::FIRST_KEY_REVOKED),
+            (Some(Slot::B), Slot::B, 4, Record::FIRST_KEY_REVOKED),
+        ] {
+            let mut part = Genuine {
+                by_second,
+                ..Genuine::default()
+            };
+            assert_eq!(decide(&mut part, None, Start::default()), Next::Reset);
+            let wanted = Record {
+                preferred: slot,
+                states: [Empty; 2],
+                floor,
+                bits,
+            };
+            assert_eq!(part.last, Some(wanted.with(slot, Confirmed)));
+        }
     }
 
     #[test]

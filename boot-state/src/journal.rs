@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! half-word  0-1     number, which is never used twice
-//!            2       preferred slot (bit 0), codes of the states of A (bits 8-11) and B (bits 12-15)
+//!            2       preferred slot (bit 0), first key revoked (bit 1), codes of the states of A (bits 8-11)
+//!                    and B (bits 12-15)
 //!            3       details of the states of A (low byte) and B
 //!            4       epoch floor
 //!            5       the layout, and no erased half-word
@@ -27,6 +28,8 @@ const BYTES: usize = 20;
 const CRC: usize = 12;
 /// Offset of the seals.
 const SEALS: usize = 16;
+/// The bit of byte 4 that says which slot is preferred. The others are [`Record::bits`].
+const PREFERS_B: u8 = 1;
 /// Version of the layout.
 const LAYOUT: u16 = 0x4201;
 
@@ -200,7 +203,7 @@ fn seal<F: Pages>(flash: &mut F, page: Page, offset: usize) -> Result<(), WriteE
 /// Returns a record without its seals.
 fn encoded(number: u32, record: Record) -> [u8; SEALS] {
     let [(a, of_a), (b, of_b)] = record.states.map(State::code);
-    let preferred = u8::from(record.preferred == Slot::B);
+    let bits = record.bits & !PREFERS_B | u8::from(record.preferred == Slot::B);
     let [n0, n1, n2, n3] = number.to_le_bytes();
     let [f0, f1] = record.floor.to_le_bytes();
     let [l0, l1] = LAYOUT.to_le_bytes();
@@ -209,7 +212,7 @@ fn encoded(number: u32, record: Record) -> [u8; SEALS] {
         n1,
         n2,
         n3,
-        preferred,
+        bits,
         a | b << 4,
         of_a,
         of_b,
@@ -236,14 +239,19 @@ fn is_right(bytes: &[u8; BYTES]) -> bool {
 
 /// Returns the boot state of a record, or `None` if it has a state that only a newer image knows.
 fn decoded(bytes: &[u8; BYTES]) -> Option<Record> {
-    let [_, _, _, _, preferred, codes, of_a, of_b, f0, f1, ..] = *bytes;
+    let [_, _, _, _, bits, codes, of_a, of_b, f0, f1, ..] = *bytes;
     Some(Record {
-        preferred: if preferred & 1 == 0 { Slot::A } else { Slot::B },
+        preferred: if bits & PREFERS_B == 0 {
+            Slot::A
+        } else {
+            Slot::B
+        },
         states: [
             State::from_code(codes & 15, of_a)?,
             State::from_code(codes >> 4, of_b)?,
         ],
         floor: u16::from_le_bytes([f0, f1]),
+        bits: bits & !PREFERS_B,
     })
 }
 

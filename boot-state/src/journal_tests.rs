@@ -142,6 +142,7 @@ fn state(n: u16) -> Record {
         },
         states: [State::Rejected(Reason::Hash), State::Trial(2)],
         floor: n,
+        bits: (n as u8) << 1,
     }
 }
 
@@ -217,5 +218,61 @@ fn any_wrong_bit_of_a_record_makes_the_one_before_count() {
         let mut flash = right.clone();
         flash.pages[0][BYTES + bit / 8] ^= 1 << (bit % 8);
         assert_eq!(open(&mut flash).record(), Some(state(1)), "bit {bit}");
+    }
+}
+
+/// Once a loader is released, these bytes never change: its code stays. Those of records 1 to 3 were written by
+/// the code of commit 59e66739, which knows no revocation.
+#[test]
+fn bytes_of_a_record_are_those_of_every_loader() {
+    let record = |preferred, states, floor, bits| Record {
+        preferred,
+        states,
+        floor,
+        bits,
+    };
+    let [empty, confirmed] = [State::Empty, State::Confirmed];
+    let signature = State::Rejected(Reason::Signature);
+    let written = [
+        (
+            record(Slot::A, [confirmed, empty], 7, 0),
+            [0x01, 0, 0, 0, 0x00, 0x05, 0, 0, 0x07, 0, 0x01, 0x42],
+            [0xD1, 0x82, 0x82, 0xFE],
+        ),
+        (
+            record(Slot::B, [signature, confirmed], 0x1234, 0),
+            [0x02, 0, 0, 0, 0x01, 0x56, 8, 0, 0x34, 0x12, 0x01, 0x42],
+            [0xFF, 0xFD, 0x18, 0xF4],
+        ),
+        (
+            record(Slot::A, [confirmed, State::Trial(2)], 1, 0),
+            [0x03, 0, 0, 0, 0x00, 0x45, 0, 2, 0x01, 0, 0x01, 0x42],
+            [0x3E, 0x2C, 0x02, 0x63],
+        ),
+        (
+            record(
+                Slot::B,
+                [State::New, confirmed],
+                2,
+                Record::FIRST_KEY_REVOKED,
+            ),
+            [0x04, 0, 0, 0, 0x03, 0x52, 0, 0, 0x02, 0, 0x01, 0x42],
+            [0xE7, 0x9F, 0x0D, 0x22],
+        ),
+        (
+            // The highest bit of byte 4 is of a newer image.
+            record(Slot::A, [State::Checking, State::Receiving], 2, 0x82),
+            [0x05, 0, 0, 0, 0x82, 0x13, 0, 0, 0x02, 0, 0x01, 0x42],
+            [0x7A, 0x4A, 0x39, 0x5F],
+        ),
+    ];
+    let mut flash = Flash::new(0xFF);
+    let mut journal = open(&mut flash);
+    for (n, (record, covered, crc)) in written.into_iter().enumerate() {
+        journal.write(&mut flash, record).unwrap();
+        let bytes = [&covered[..], &crc, &[0; 4]].concat();
+        let at = n * BYTES;
+        assert_eq!(flash.pages[0][at..at + BYTES], bytes, "record {n}");
+        assert_eq!(open(&mut flash.clone()).record(), Some(record));
     }
 }

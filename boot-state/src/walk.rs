@@ -9,8 +9,8 @@ use std::{collections::HashSet, vec, vec::Vec};
 use register_map::update::{Reason, Slot, State, TRIALS};
 
 use crate::{
-    Record,
-    commands::Running,
+    Image, Record,
+    commands::{Order, Running},
     decide::{Next, Part, Start, Unwritten, decide},
 };
 
@@ -21,8 +21,8 @@ enum Content {
     Nothing,
     /// An image whose CRC-32 is right and whose signature is wrong.
     Forged,
-    /// A genuine image of this epoch.
-    Genuine(u16, Behaviour),
+    /// A genuine image of this epoch, by this key.
+    Genuine(u16, Behaviour, Key),
 }
 use Content::{Forged, Genuine, Nothing};
 
@@ -35,20 +35,36 @@ enum Behaviour {
 }
 use Behaviour::{Fails, Serves};
 
-const CONTENTS: [Content; 6] = [
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum Key {
+    First,
+    Second,
+}
+use Key::{First, Second};
+
+const CONTENTS: [Content; 9] = [
     Nothing,
     Forged,
-    Genuine(1, Serves),
-    Genuine(1, Fails),
-    Genuine(2, Serves),
-    Genuine(2, Fails),
+    Genuine(1, Serves, First),
+    Genuine(1, Fails, First),
+    Genuine(2, Serves, First),
+    Genuine(2, Fails, First),
+    Genuine(1, Serves, Second),
+    Genuine(2, Serves, Second),
+    Genuine(2, Fails, Second),
 ];
 
 impl Content {
-    fn epoch(self) -> u16 {
+    fn image(self) -> Image {
         match self {
-            Genuine(epoch, _) => epoch,
-            _ => 1,
+            Genuine(epoch, _, key) => Image {
+                epoch,
+                by_second: key == Second,
+            },
+            _ => Image {
+                epoch: 1,
+                by_second: false,
+            },
         }
     }
 }
@@ -64,6 +80,8 @@ struct Unit {
     chosen: Option<Slot>,
     /// The slot that runs, and whether 0xB001 was ordered since it started. `None` without power.
     runs: Option<(Slot, bool)>,
+    /// The first key was revoked once. No part knows this when the boot state is lost.
+    ended: bool,
 }
 
 /// The part during a start. The flash refuses more than this number of writes.
@@ -84,13 +102,14 @@ impl Part for Starting {
         self.content(slot) != Nothing
     }
 
-    fn epoch(&mut self, slot: Slot) -> u16 {
-        self.content(slot).epoch()
+    fn image(&mut self, slot: Slot) -> Image {
+        self.content(slot).image()
     }
 
-    fn check(&mut self, slot: Slot, floor: u16) -> Result<(), Reason> {
+    fn check(&mut self, slot: Slot, floor: u16, revoked: bool) -> Result<(), Reason> {
         match self.content(slot) {
-            Genuine(epoch, _) if epoch >= floor => Ok(()),
+            Genuine(_, _, First) if revoked => Err(Reason::Signature),
+            Genuine(epoch, ..) if epoch >= floor => Ok(()),
             Genuine(..) => Err(Reason::Epoch),
             Forged => Err(Reason::Signature),
             Nothing => Err(Reason::Crc),
@@ -111,6 +130,15 @@ impl Unit {
 
     fn state(&self, slot: Slot) -> Option<State> {
         self.record.map(|record| record.state(slot))
+    }
+
+    fn with_record(self, record: Option<Record>) -> Self {
+        let revoked = record.is_some_and(|record| record.is_revoked());
+        Self {
+            record,
+            ended: self.ended || revoked,
+            ..self
+        }
     }
 
     fn without_power(self) -> Self {
@@ -143,10 +171,16 @@ impl Unit {
                 let record = part.record;
                 next = decide(&mut part, record, start);
             }
-            let unit = Self {
-                record: part.record,
-                ..self
-            };
+            let unit = self.with_record(part.record);
+            if self.record.is_none()
+                && let Some(record) = unit.record
+            {
+                let is_left = self.slots.iter().any(|slot| slot.image().by_second);
+                assert!(
+                    !self.ended || record.is_revoked() || !is_left,
+                    "loses the revocation with the boot state: {self:?}"
+                );
+            }
             after.push(unit.without_power());
             after.extend(unit.runs(next));
             assert!(
@@ -160,14 +194,21 @@ impl Unit {
     fn runs(self, next: Next) -> Option<Self> {
         match next {
             Next::Run { slot, chosen } => {
-                let Genuine(epoch, _) = self.content(slot) else {
-                    panic!("{self:?} starts {slot:?}");
-                };
+                assert!(
+                    matches!(self.content(slot), Genuine(..)),
+                    "{self:?} starts {slot:?}"
+                );
                 if let Some(record) = self.record {
                     let is_last_resort = slot != record.preferred
                         && record.state(slot) == State::Confirmed
                         && !chosen;
-                    assert!(epoch >= record.floor || is_last_resort, "{self:?} {slot:?}");
+                    let is_preferred =
+                        slot == record.preferred && record.state(slot) == State::Confirmed;
+                    let image = self.content(slot).image();
+                    let may = record.allows(image)
+                        || is_last_resort
+                        || is_preferred && image.epoch >= record.floor;
+                    assert!(may, "{self:?} {slot:?}");
                 }
                 Some(Self {
                     chosen: chosen.then_some(slot),
@@ -212,22 +253,35 @@ impl Unit {
             slots[other as usize] = content;
             Self { slots, ..self }
         };
+        // Both pages of the boot state are lost.
+        if self
+            .slots
+            .iter()
+            .any(|slot| matches!(slot, Genuine(_, Serves, _)))
+        {
+            after.push(off.with_record(None));
+        }
+        // The flash of a slot ages, also that of the running image.
         if running.is_confirmed() {
-            // The flash of the other slot ages.
             after.push(with(Nothing));
         }
-        let Genuine(epoch, Serves) = self.content(slot) else {
+        if record.state(other) == State::Confirmed && self.content(other) != Nothing {
+            let mut slots = self.slots;
+            slots[slot as usize] = Nothing;
+            after.push(Self { slots, ..off });
+        }
+        let Genuine(_, Serves, _) = self.content(slot) else {
             return after;
         };
+        let [own, there] = [slot, other].map(|slot| self.content(slot).image());
         // COMMAND 2.
         after.extend(self.started(true, false));
         // 0xB002, 0xB003 and 0xB004 end the choice of SW01 = 254.
         let ordered = |record| Self {
-            record: Some(record),
             chosen: None,
-            ..self
+            ..self.with_record(Some(record))
         };
-        if let Ok(record) = running.prepare() {
+        if let Ok(record) = running.after(Order::Prepare, there) {
             // Before, during and after the erase.
             for unit in [self, with(Nothing)] {
                 after.push(Self {
@@ -241,11 +295,14 @@ impl Unit {
             after.extend(CONTENTS.map(with));
         }
         let intact = self.content(other) != Nothing;
-        if let Some(record) = running.finish().ok().filter(|_| intact) {
+        let finished = running.after(Order::Finish, there);
+        if let Some(record) = finished.ok().filter(|_| intact) {
             after.extend(ordered(record).started(false, false));
         }
-        after.push(ordered(running.confirm(epoch)));
-        let back = running.go_back(self.content(other).epoch());
+        if let Ok(record) = running.after(Order::Confirm, own) {
+            after.push(ordered(record));
+        }
+        let back = running.after(Order::GoBack, there);
         if let Some(record) = back.ok().filter(|_| intact) {
             after.extend(ordered(record).started(false, false));
         }
@@ -285,12 +342,16 @@ fn nothing_unsigned_starts_no_confirmed_image_is_lost_and_no_state_is_a_dead_end
     for a in CONTENTS {
         for b in CONTENTS {
             let slots = [a, b];
-            if slots.iter().any(|slot| matches!(slot, Genuine(_, Serves))) {
+            if slots
+                .iter()
+                .any(|slot| matches!(slot, Genuine(_, Serves, _)))
+            {
                 seen.insert(Unit {
                     slots,
                     record: None,
                     chosen: None,
                     runs: None,
+                    ended: false,
                 });
             }
         }
@@ -310,5 +371,6 @@ fn nothing_unsigned_starts_no_confirmed_image_is_lost_and_no_state_is_a_dead_end
             "no update ends in {slot:?}"
         );
     }
+    std::println!("{} states", seen.len());
     assert!(seen.len() > 1000, "only {} states", seen.len());
 }

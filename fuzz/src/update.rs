@@ -78,7 +78,8 @@ fn header(script: &mut Script<'_>) {
     };
     assert_eq!(intact(&slot, crc32).is_ok(), right);
     // Hash and signature would have to be guessed.
-    let refused = genuine::check(&slot, ADDRESS, 1, 0, &[[7; 32]; 2]);
+    let number = u32::from_be_bytes(slot[156..160].try_into().expect("four bytes"));
+    let refused = genuine::check(&slot, ADDRESS, 1, 0, &[([7; 32], number)]);
     let reason = refused.expect_err("nobody has signed it");
     assert_eq!(reason == Reason::Magic, !form);
     assert_eq!(reason == Reason::Length, form && !bounds);
@@ -116,6 +117,7 @@ fn record(script: &mut Script<'_>) -> Record {
         preferred,
         states,
         floor,
+        bits: script.byte() & !1,
     }
 }
 

@@ -4,19 +4,16 @@
 use register_map::update::{Header, Reason};
 use salty::{PublicKey, Sha512, Signature};
 
+/// A public key, and its number, by which the header of an image names it.
+pub type Key = ([u8; 32], u32);
+
 /// Checks the image in a slot at an address. The length in its header is checked before anything behind the header is
-/// read.
+/// read. The signature must be by one of `keys`.
 ///
 /// # Errors
 ///
 /// What is wrong with it.
-pub fn check(
-    slot: &[u8],
-    address: u32,
-    board: u8,
-    floor: u16,
-    keys: &[[u8; 32]],
-) -> Result<(), Reason> {
+pub fn check(slot: &[u8], address: u32, board: u8, floor: u16, keys: &[Key]) -> Result<(), Reason> {
     let header = Header::of(slot)?;
     let application = header.application(slot)?;
     header.suits(board, address)?;
@@ -27,12 +24,8 @@ pub fn check(
         return Err(Reason::Hash);
     }
     let signature = Signature::from(&header.signature());
-    let is_signer = |key: &&[u8; 32]| {
-        let [a, b, c, d, ..] = hash(*key);
-        u32::from_be_bytes([a, b, c, d]) == header.key()
-    };
-    let signer = keys.iter().find(is_signer);
-    let key = signer.and_then(|key| PublicKey::try_from(key).ok());
+    let signer = keys.iter().find(|(_, number)| *number == header.key());
+    let key = signer.and_then(|(key, _)| PublicKey::try_from(key).ok());
     match key.map(|key| key.verify(header.signed(), &signature)) {
         Some(Ok(())) => Ok(()),
         _ => Err(Reason::Signature),
@@ -78,9 +71,17 @@ mod tests {
         slot
     }
 
+    /// Returns the keys of the loader, as its build script does.
+    fn keys() -> [Key; 2] {
+        [pair(1), pair(2)].map(|pair| {
+            let key = pair.public.as_bytes();
+            let [a, b, c, d, ..] = hash(key);
+            (*key, u32::from_be_bytes([a, b, c, d]))
+        })
+    }
+
     fn verdict(slot: &[u8]) -> Result<(), Reason> {
-        let keys = [pair(1), pair(2)].map(|pair| *pair.public.as_bytes());
-        check(slot, ADDRESS, 1, FLOOR, &keys)
+        check(slot, ADDRESS, 1, FLOOR, &keys())
     }
 
     #[test]
@@ -108,6 +109,15 @@ mod tests {
         let mut slot = signed(&pair(1), |_| {});
         slot[512 + 1023] ^= 1;
         assert_eq!(verdict(&slot), Err(Reason::Hash));
+    }
+
+    #[test]
+    fn revoked_key_signs_no_genuine_image() {
+        let [_, second] = keys();
+        for (seed, verdict) in [(1, Err(Reason::Signature)), (2, Ok(()))] {
+            let slot = signed(&pair(seed), |_| {});
+            assert_eq!(check(&slot, ADDRESS, 1, FLOOR, &[second]), verdict);
+        }
     }
 
     #[test]

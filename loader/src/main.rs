@@ -1,8 +1,8 @@
 //! The loader of a modio: chooses which of two images is started, and checks that a new one is genuine. It has no UART,
 //! no command and no protocol.
 //!
-//! [`boot_state::decide`] has the decisions, [`genuine`](loader::genuine) what an image must be. The loader runs on the internal oscillator and
-//! leaves everything as after a reset but the watchdog, which cannot be stopped.
+//! [`boot_state::decide`] has the decisions, [`genuine`](loader::genuine) what an image must be. The loader runs on the
+//! internal oscillator and leaves everything as after a reset but the watchdog, which cannot be stopped.
 
 #![no_std]
 #![no_main]
@@ -18,23 +18,29 @@ use board_support::{
     pac, restart,
 };
 use boot_state::{
-    Record,
+    Image, Record,
     decide::{Next, Part, Start, Unwritten, decide},
     journal::Journal,
 };
 use cortex_m_rt::{entry, exception};
-use loader::genuine;
+use loader::genuine::{self, Key};
 use ports::pages::WriteError;
 use register_map::{
     Board,
     layout::HEADER,
-    update::{Header, Reason, Slot, intact},
+    update::{Header, Reason, Slot, intact, keys},
 };
 
-/// The public keys that the loader trusts. The second one stays in a safe.
-const KEYS: [[u8; 32]; 2] = include!(concat!(env!("OUT_DIR"), "/keys.rs"));
+/// The public keys that the loader trusts. The second one stays in a safe, and ends the first.
+const KEYS: [Key; 2] = include!(concat!(env!("OUT_DIR"), "/keys.rs"));
 
-/// Whether one of them is the development key, whose private half everybody has.
+/// The numbers of the keys, for the application.
+// SAFETY: the section has a place of its own in the linker's script, and nothing else in it.
+#[unsafe(link_section = ".keys")]
+#[used]
+static NUMBERS: [u8; keys::BYTES] = include!(concat!(env!("OUT_DIR"), "/numbers.rs"));
+
+/// Whether one of them is a development key, whose private half everybody has.
 const DEVELOPMENT: bool = include!(concat!(env!("OUT_DIR"), "/development.rs"));
 
 /// The board that the loader is built for.
@@ -62,15 +68,19 @@ impl Part for Unit {
         self.intact(slot).is_some()
     }
 
-    fn epoch(&mut self, slot: Slot) -> u16 {
+    fn image(&mut self, slot: Slot) -> Image {
         let header = Header::of(slot_bytes(slot as usize));
-        header.map_or(0, |header| header.epoch())
+        header.map_or(Image::default(), |header| Image {
+            epoch: header.epoch(),
+            by_second: header.key() == KEYS[1].1,
+        })
     }
 
-    fn check(&mut self, slot: Slot, floor: u16) -> Result<(), Reason> {
+    fn check(&mut self, slot: Slot, floor: u16, revoked: bool) -> Result<(), Reason> {
         self.loading.run_fast();
+        let keys = if revoked { &KEYS[1..] } else { &KEYS };
         let (bytes, address) = (slot_bytes(slot as usize), slot_address(slot as usize));
-        genuine::check(bytes, address, BOARD.code as u8, floor, &KEYS)
+        genuine::check(bytes, address, BOARD.code as u8, floor, keys)
     }
 
     fn write(&mut self, record: Record) -> Result<(), Unwritten> {

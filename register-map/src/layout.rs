@@ -5,6 +5,9 @@ use crate::part::{FLASH_BASE, KIB, Part};
 /// Bytes of the loader, at the beginning of flash.
 pub const LOADER: u32 = 16 * KIB;
 
+/// Address of the [numbers of the loader's keys](crate::update::keys), its last bytes.
+pub const LOADER_KEYS: u32 = FLASH_BASE + LOADER - crate::update::keys::BYTES as u32;
+
 /// Bytes of the header of an image. The application follows.
 pub const HEADER: u32 = 512;
 

@@ -48,7 +48,8 @@ const CONFIGURATION_NOTES: &str = "
   line are exception 06, and KEY and status bit 5 read 1 over the owner's line only. KEY over the other line takes the
   lock.
 - Twenty saves are possible one after another, and then one a minute; between them a save is exception 06. A save that
-  writes nothing is always possible and does not count. The number of saves left survives every reset but a power-on.
+  writes nothing is always possible and does not count. COMMAND 0xB001 and 0xB004 cost one each, and 0xB002 without a new
+  transfer. The number of saves left survives every reset but a power-on.
 - START = 0xFFFE, *as it was*, exists on boards with more than 128 KiB of flash: not on the modio-02 and the eth-io5r,
   where it is exception 03. [safety.md](safety.md#outputs-as-they-were) says which value an output then has.
 - A broadcast over the air writes nothing here but HEARTBEAT: it is exception 06, which is not sent. With LORA 2 no other

@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, ensure};
 use ed25519_dalek::{SigningKey, VerifyingKey};
 use fs_err as fs;
-use register_map::update::DEVELOPMENT_KEY;
 use sha2::{Digest as _, Sha512};
 
 use crate::error::usage;
@@ -14,6 +13,8 @@ use crate::workspace::Workspace;
 
 /// The private key that everybody has.
 const DEVELOPMENT: &str = "loader/keys/development.key";
+/// The public halves of this key and of a second one, which everybody has, too.
+const DEVELOPMENT_PUBLIC: &str = include_str!("../../loader/keys/development.pub");
 /// The public keys of the loader in a release.
 const PRODUCTION: &str = "loader/keys/production.pub";
 
@@ -122,11 +123,12 @@ fn check(own: &VerifyingKey, public: &[VerifyingKey]) -> Result<()> {
     Ok(())
 }
 
-/// Refuses the development key.
+/// Refuses the development keys.
 fn refuse_development(key: &VerifyingKey) -> Result<()> {
+    let key = digits(key.as_bytes());
     ensure!(
-        first_bytes(key.as_bytes()) != DEVELOPMENT_KEY.to_be_bytes(),
-        "everybody has the development key, so no release is signed with it"
+        DEVELOPMENT_PUBLIC.lines().all(|line| line != key),
+        "everybody has the development keys, so no release is signed with them"
     );
     Ok(())
 }
@@ -189,7 +191,10 @@ mod tests {
     fn release_refuses_the_development_key_and_a_key_that_the_loader_does_not_trust() {
         let keys = [1, 2, 3].map(|byte| SigningKey::from_bytes(&[byte; 32]));
         let [own, safe, other] = keys.each_ref().map(SigningKey::verifying_key);
-        let development = read(&workspace(), None).unwrap().verifying_key();
+        let second = workspace().root.join("loader/keys/development-second.key");
+        let both = [None, Some(&*second)];
+        let [development, second] =
+            both.map(|path| read(&workspace(), path).unwrap().verifying_key());
         let lines = |keys: &[&VerifyingKey]| {
             let lines: Vec<_> = keys.iter().map(|key| digits(key.as_bytes())).collect();
             public(&(lines.join("\n") + "\n"))
@@ -203,6 +208,7 @@ mod tests {
         refused(check(&other, &trusted), "belongs to none");
         refused(check(&development, &trusted), "everybody");
         refused(lines(&[&own, &development]).map(drop), "everybody");
+        refused(check(&second, &trusted), "everybody");
         refused(lines(&[&own]).map(drop), "two lines");
         let missing = Release {
             key: None,
@@ -215,9 +221,8 @@ mod tests {
     #[test]
     fn development_key_belongs_to_the_first_public_key_of_the_loader() {
         let development = read(&workspace(), None).unwrap();
-        let lines = include_str!("../../loader/keys/development.pub");
         assert_eq!(
-            lines.lines().next(),
+            DEVELOPMENT_PUBLIC.lines().next(),
             Some(&digits(development.verifying_key().as_bytes())[..])
         );
         for wrong in ["", "12", "zz", &"é".repeat(32), &"00".repeat(33)] {

@@ -3,7 +3,7 @@
 //! The pins are those on which three sources agree: eddyem/stm32samples, `F1:F103/FX3U/` (with a schematic of the -24MR),
 //! kinsamanka/openplc-stm32-freertos, `src/boards.h` (BOARD_FX3U), and Chupakabra303/FX_PLC_STM32duino.
 
-use super::{AddressPins, Descriptor, FullScale, LinePins, PortKind, SecondPins, SlotPins};
+use super::{AddressPins, Descriptor, FullScale, Held, LinePins, PortKind, SecondPins, SlotPins};
 use crate::{
     gesture::Gesture,
     pin::{Pin, Port},
@@ -17,7 +17,7 @@ pub(super) const RUN: Pin = Pin::b(2);
 const DRIVER: Pin = Pin::a(14);
 
 /// The line must stay idle while no UART drives it.
-const HELD: [(Pin, bool); 2] = [(DRIVER, false), (Usart::Uart4.tx(), true)];
+const HELD: [(Pin, Held); 2] = [(DRIVER, Held::Low), (Usart::Uart4.tx(), Held::High)];
 
 const LEDS: [Pin; 1] = [Pin::d(10)];
 

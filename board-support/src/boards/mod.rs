@@ -28,8 +28,8 @@ pub struct Descriptor {
     pub line: LinePins,
     /// The last port with pins that are used. The clocks of the ports from A to this one are on.
     pub last_port: Port,
-    /// Pins that are outputs with a level, true is high, from the first instructions of loader and application on.
-    pub held: &'static [(Pin, bool)],
+    /// Pins that are held from the first instructions of loader and application on.
+    pub held: &'static [(Pin, Held)],
     /// The slots in the order of their ports. The port numbers are consecutive.
     pub slots: &'static [SlotPins],
     /// What sets the unit address.
@@ -39,6 +39,17 @@ pub struct Descriptor {
     pub leds: &'static [Pin],
     /// The second line.
     pub second: Option<SecondPins>,
+}
+
+/// How a pin is held.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Held {
+    /// An output that is low.
+    Low,
+    /// An output that is high.
+    High,
+    /// An input with pull-down.
+    PulledDown,
 }
 
 /// What sets the unit address.

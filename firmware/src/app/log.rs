@@ -3,7 +3,7 @@
 //! docs/decisions.md says why they are text.
 
 use board_support::{ClockSource, boards::SLOTS, design::CRYSTAL_FAULTS, fault};
-use firmware::{config, start_up::Address};
+use firmware::{HAS_SLOTS, config, start_up::Address};
 use heapless::String;
 use modio_drivers::ModuleError;
 use register_map::{
@@ -48,15 +48,9 @@ pub struct Start {
     pub config_invalid: bool,
 }
 
-/// The names of the reset flags, from bit 0.
-const CAUSES: [&str; 6] = [
-    "low-power",
-    "window watchdog",
-    "independent watchdog",
-    "software",
-    "power-on",
-    "pin",
-];
+/// The names of the reset flags, from bit 2. Bits 0 and 1 are of the low-power modes and of the window watchdog, which
+/// nothing here uses.
+const CAUSES: [&str; 4] = ["independent watchdog", "software", "power-on", "pin"];
 
 /// Text for a module that fails as a whole.
 const SILENT: &str = "the module does not answer";
@@ -134,7 +128,7 @@ impl Log {
         line.text(BOARD.name).text(", ");
         self.write(line.number(baud).text(" ").text(format).text(mode));
         for (bit, cause) in CAUSES.iter().enumerate() {
-            if start.reset_cause & (1 << bit) != 0 {
+            if start.reset_cause & (4 << bit) != 0 {
                 self.write(Line::of("reset: ").text(cause));
             }
         }
@@ -153,6 +147,8 @@ impl Log {
         match start.address {
             Address::Unit(unit) => self.write(Line::of("unit address ").number(unit.into())),
             Address::Recovery => self.write(&mut Line::of("unit address 255 (recovery mode)")),
+            // Without a switch there is always an address.
+            Address::Invalid if !BOARD.switch => {}
             Address::Invalid => {
                 let text = ": no unit address";
                 self.write(
@@ -190,6 +186,8 @@ impl Log {
             Event::Saved => line.text("configuration saved"),
             Event::SaveFailed => line.text("WARN the flash could not be written"),
             Event::LineRepaired => line.text("WARN line: set up again"),
+            // The board has none.
+            Event::Radio(_) if !HAS_SLOTS => &mut line,
             Event::Radio(true) => line.text("radio: ready"),
             Event::Radio(false) => line.text("WARN radio: ").text(SILENT),
             Event::LowSupply => line.text("WARN the supply is too low for the flash"),

@@ -11,7 +11,7 @@ use firmware::{
     update::{After, Done, InSlot, Job, Update, described},
 };
 use ports::pages::{Slot as _, WriteError};
-use register_map::update::Slot;
+use register_map::update::{Slot, keys};
 use rtic::Mutex;
 
 use crate::{
@@ -54,6 +54,7 @@ impl Updating {
             slot,
             self.journal.record(),
             images,
+            keys::words(Flash::loader_keys()),
             switched,
         ))
     }
@@ -129,8 +130,8 @@ fn write(journal: &mut Journal, flash: &mut Flash, record: Record) -> Result<boo
 }
 
 /// Describes the image in the slot that does not run.
-fn other(flash: &mut Flash) -> [u16; 8] {
+fn other(flash: &mut Flash) -> [u16; 10] {
     flash
         .other_slot()
-        .map_or([0; 8], |slot| described(slot.bytes()))
+        .map_or([0; 10], |slot| described(slot.bytes()))
 }

@@ -176,10 +176,17 @@ impl<const SLOTS: usize> Config<SLOTS> {
         }
     }
 
-    /// Returns whether the request that is being served is for all units.
+    /// Returns whether the request that is being served is to the unit's own address: neither to all units nor by serial
+    /// number.
     #[must_use]
-    pub const fn is_broadcast(&self) -> bool {
-        self.origin.broadcast
+    pub const fn is_to_the_address(&self) -> bool {
+        !self.origin.broadcast && !self.origin.by_serial
+    }
+
+    /// Returns whether the request that is being served came over the air.
+    #[must_use]
+    pub fn is_over_the_air(&self) -> bool {
+        self.origin.line == LineName::Second && self.has_radio()
     }
 
     /// Keeps the lock open for as long as after a write, if it is open for the request.
@@ -269,8 +276,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
             return Err(Exception::IllegalDataValue);
         }
         self.check_line()?;
-        let is_aired = self.origin.line == LineName::Second && self.has_radio();
-        let aired = self.origin.broadcast && is_aired;
+        let aired = self.origin.broadcast && self.is_over_the_air();
         let order = words.get(COMMAND.wrapping_sub(span.start()));
         let cannot_save = order == Some(Command::Save.code())
             && (self.save != Save::None || !self.can_pay(span, words));
@@ -506,6 +512,12 @@ impl<const SLOTS: usize> Config<SLOTS> {
     #[must_use]
     pub const fn saves_left(&self) -> u8 {
         self.saves.left()
+    }
+
+    /// Returns the number of saves in the budget without the one that a save under way will take.
+    #[must_use]
+    pub fn spare_saves(&self) -> u8 {
+        self.saves.left().saturating_sub(self.has_save().into())
     }
 
     /// Sets the number of saves in the budget to the number that was kept over the reset.

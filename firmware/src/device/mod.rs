@@ -51,7 +51,7 @@ pub use port::IoPort;
 pub use state::{Identity, State};
 
 use crate::config::{Config, LineName, Origin, Point};
-use crate::update::{Order, TRIAL_S, Update};
+use crate::update::{TRIAL_S, Update, order_of};
 use crate::{HAS_EVENTS, HAS_SLOTS};
 
 /// The device behind the line, on a board with `SLOTS` slots.
@@ -320,13 +320,13 @@ impl<const SLOTS: usize> Device<SLOTS> {
         self.settings_may_have_changed();
     }
 
-    /// Passes an order to the update. A preparation costs a save of the budget.
+    /// Passes an order to the update, which may cost a save of the budget.
     fn order_update(&mut self, order: Command, line: LineName) {
         if let Some(update) = &mut self.update
-            && let Some(order) = Order::of(order)
+            && let Some(order) = order_of(order)
             // The other line may have given an order since this one was checked.
-            && update.check(order).is_ok()
-            && (order != Order::Prepare || self.config.take_save().is_some())
+            && let Ok(costs) = update.check(order, self.config.spare_saves())
+            && (!costs || self.config.take_save().is_some())
         {
             update.take(order, line);
         }
@@ -341,15 +341,12 @@ impl<const SLOTS: usize> Device<SLOTS> {
         let Some(update) = &self.update else {
             return Err(Exception::IllegalDataValue);
         };
-        let allowed = match Order::of(command) {
-            // A save that is under way takes one from the budget.
-            Some(Order::Prepare) if self.config.saves_left() <= self.config.has_save() as u8 => {
-                false
-            }
-            Some(order) => update.check(order).is_ok(),
-            None => true,
+        let allowed = match order_of(command) {
+            Some(order) => update.check(order, self.config.spare_saves()).is_ok(),
+            // The unit would leave the air until somebody stands before it: there is no radio in recovery.
+            None => !self.config.is_over_the_air(),
         };
-        if allowed && !self.config.is_broadcast() {
+        if allowed && self.config.is_to_the_address() {
             Ok(())
         } else {
             Err(Exception::ServerDeviceBusy)

@@ -19,8 +19,8 @@ mod tests;
 
 use core::cell::Cell;
 
-use boot_state::Record;
 use boot_state::commands::{Refused, Running};
+use boot_state::{Image, Record};
 use modbus_server::{Exception, Span, Words};
 use register_map::codes::Command;
 use register_map::layout::Layout;
@@ -28,6 +28,7 @@ use register_map::state::update as register;
 use register_map::update::{BLOCK, BLOCK_BYTES, Header, Reason, Slot, State, block_at, status};
 
 use crate::config::LineName;
+pub use boot_state::commands::Order;
 use missing::Missing;
 pub use work::{Block, Done, InSlot, Job, described};
 
@@ -37,30 +38,15 @@ pub const TRIAL_S: u32 = 15 * 60;
 /// Number of erases of pages that do not take their blocks.
 const REPAIRS: u8 = 8;
 
-/// An order that the background task carries out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Order {
-    /// COMMAND 0xB001.
-    Prepare,
-    /// COMMAND 0xB002.
-    Finish,
-    /// COMMAND 0xB003.
-    Confirm,
-    /// COMMAND 0xB004.
-    GoBack,
-}
-
-impl Order {
-    /// Returns the order of a command.
-    #[must_use]
-    pub const fn of(command: Command) -> Option<Self> {
-        match command {
-            Command::Prepare => Some(Self::Prepare),
-            Command::Finish => Some(Self::Finish),
-            Command::Confirm => Some(Self::Confirm),
-            Command::GoBack => Some(Self::GoBack),
-            _ => None,
-        }
+/// Returns the order of a command.
+#[must_use]
+pub const fn order_of(command: Command) -> Option<Order> {
+    match command {
+        Command::Prepare => Some(Order::Prepare),
+        Command::Finish => Some(Order::Finish),
+        Command::Confirm => Some(Order::Confirm),
+        Command::GoBack => Some(Order::GoBack),
+        _ => None,
     }
 }
 
@@ -84,8 +70,12 @@ pub struct Update {
     running: Running,
     /// SW01 = 254 chose the running slot.
     switched: bool,
-    /// The running image and the one in the other slot, as file 2 reports them.
-    images: [[u16; 8]; 2],
+    /// The running image and the one in the other slot, as [`described`].
+    images: [[u16; 10]; 2],
+    /// The numbers of the loader's keys, as file 2 reports them.
+    keys: [u16; 4],
+    /// The loader wrote no boot state, or nobody can read it. The next start mends that.
+    lost: bool,
     /// The line that ordered the preparation.
     line: LineName,
     /// The CRC-32 in the header of the image that is received, once it is known.
@@ -109,22 +99,26 @@ pub struct Update {
 
 impl Update {
     /// Returns the update of a board with this code and this layout, which runs from `slot`. `images` are the running
-    /// image and the other one, as [`described`]. Without a `record`, the loader found the running image genuine and
-    /// could not write it down.
+    /// image and the other one, as [`described`], and `keys` are the numbers of the loader's keys, zero if it says none.
+    /// Without a `record`, the loader found the running image genuine and could not write it down, so nothing is ordered
+    /// until the next start.
     #[must_use]
     pub fn new(
         board: u8,
         layout: &'static Layout,
         slot: Slot,
         record: Option<Record>,
-        images: [[u16; 8]; 2],
+        images: [[u16; 10]; 2],
+        keys: [u16; 4],
         switched: bool,
     ) -> Self {
         let first = Record {
             preferred: slot,
             states: [State::Empty; 2],
-            floor: images[0][EPOCH],
+            floor: 0,
+            bits: 0,
         };
+        let lost = record.is_none();
         let record = record.unwrap_or(first.with(slot, State::Confirmed));
         Self {
             board,
@@ -136,6 +130,8 @@ impl Update {
             },
             switched,
             images,
+            keys,
+            lost,
             line: LineName::Rs485,
             header: None,
             missing: Missing::all(0),
@@ -173,23 +169,38 @@ impl Update {
             | bit(register::SWITCHED, self.switched)
     }
 
-    /// Checks whether the state allows an order.
+    /// Checks whether the state allows an order, and returns whether it costs a save. `saves` are left of the budget.
     ///
     /// # Errors
     ///
-    /// When it does not, or the order before is not carried out yet.
-    pub fn check(&self, order: Order) -> Result<(), Refused> {
-        let running = &self.running;
-        if self.order.is_some() {
+    /// When the state or the budget does not allow it, or the order before is not carried out yet.
+    pub fn check(&self, order: Order, saves: u8) -> Result<bool, Refused> {
+        let waits = order == Order::Finish && self.is_erasing();
+        if self.order.is_some() || self.lost || waits {
             return Err(Refused);
         }
-        match order {
-            Order::Prepare => running.prepare().map(drop),
-            Order::Finish if self.is_erasing() => Err(Refused),
-            Order::Finish => running.finish().map(drop),
-            Order::Confirm => Ok(()),
-            Order::GoBack => running.go_back(self.images[1][EPOCH]).map(drop),
+        let costs = self
+            .running
+            .change(order, self.image_of(order))?
+            .costs_a_save;
+        if costs && saves == 0 {
+            return Err(Refused);
         }
+        Ok(costs)
+    }
+
+    /// Returns the image that an order is about.
+    fn image_of(&self, order: Order) -> Image {
+        let [running, other] = &self.images;
+        let image = if order == Order::Confirm {
+            running
+        } else {
+            other
+        };
+        let [_, _, epoch, _, _, _, k1, k0, _, _] = *image;
+        let [_, _, high, low] = self.keys;
+        let by_second = (k1, k0) == (high, low) && (high, low) != (0, 0);
+        Image { epoch, by_second }
     }
 
     /// Takes an order that [`Self::check`] allows, from this line.
@@ -323,12 +334,9 @@ impl Update {
     #[must_use]
     pub fn record(&self, record: u16) -> u16 {
         let other = self.running.other().code();
-        let image = |image: usize| {
-            let words = self.images[image % 2].iter();
-            words
-                .copied()
-                .nth(usize::from(record % 8))
-                .unwrap_or_default()
+        let of = |image: u16, word: u16| {
+            let word = self.images[usize::from(image % 2)].get(usize::from(word));
+            word.copied().unwrap_or_default()
         };
         match record {
             status::STATE => other.0.into(),
@@ -343,8 +351,10 @@ impl Update {
             status::FLOOR => self.running.record.floor,
             status::PAGES if self.order == Some(Order::Prepare) => self.all_pages(),
             status::PAGES => self.pages + u16::from(self.bad.is_some()),
-            record if status::RUNNING.contains(&record) => image(0),
-            record if status::OTHER.contains(&record) => image(1),
+            IMAGES..CRCS => of(record / 8 - 1, record % 8),
+            CRCS..KEYS => of(record / 2, 8 + record % 2),
+            KEYS..status::REVOKED => self.keys[usize::from(record % 4)],
+            status::REVOKED => self.running.record.is_revoked().into(),
             status::BITMAP.. => self.missing.word(record - status::BITMAP),
             _ => 0,
         }
@@ -360,31 +370,28 @@ impl Update {
     #[inline(never)]
     #[must_use]
     pub fn next(&self) -> Option<Job> {
-        let running = &self.running;
-        let [staged, _] = &self.staged;
-        let last = self.pages.checked_sub(1);
-        let page = self.bad.filter(|_| self.repairs > 0).or(last);
-        if self.order == Some(Order::Prepare) {
-            return running.prepare().ok().map(Job::Write);
+        if self.order != Some(Order::Prepare) {
+            let [staged, _] = &self.staged;
+            let last = self.pages.checked_sub(1);
+            let page = self.bad.filter(|_| self.repairs > 0).or(last);
+            if let Some(page) = page.filter(|_| !self.is_worn()) {
+                return Some(Job::InSlot(InSlot::Erase(page)));
+            }
+            if let Some(block) = staged {
+                return Some(Job::InSlot(InSlot::Program(block.clone())));
+            }
         }
-        if let Some(page) = page.filter(|_| !self.is_worn()) {
-            return Some(Job::InSlot(InSlot::Erase(page)));
+        let order = self.order?;
+        if matches!(order, Order::Finish | Order::GoBack) && !self.intact {
+            return Some(Job::InSlot(InSlot::Check));
         }
-        if let Some(block) = staged {
-            return Some(Job::InSlot(InSlot::Program(block.clone())));
-        }
-        let record = match self.order? {
-            Order::Confirm => Ok(running.confirm(self.images[0][EPOCH])),
-            _ if !self.intact => return Some(Job::InSlot(InSlot::Check)),
-            Order::Finish => running.finish(),
-            Order::Prepare | Order::GoBack => running.go_back(self.images[1][EPOCH]),
-        };
+        let record = self.running.after(order, self.image_of(order));
         record.ok().map(Job::Write)
     }
 
     /// Notes the end of the step that [`Self::next`] has returned. `image` describes the image in the other slot, as it
     /// is now.
-    pub fn end(&mut self, job: &Job, done: Done, image: [u16; 8]) -> After {
+    pub fn end(&mut self, job: &Job, done: Done, image: [u16; 10]) -> After {
         self.images[1] = image;
         match (job, done) {
             (Job::InSlot(InSlot::Erase(page)), Done::Erased(erased)) => {
@@ -463,8 +470,11 @@ impl Update {
     }
 }
 
-/// Index of the security epoch in what file 2 reports of an image.
-const EPOCH: usize = 2;
+/// Records of file 2 with the two images, with their CRC-32, and with the keys.
+const IMAGES: u16 = status::RUNNING.start;
+const CRCS: u16 = status::CRCS.start;
+const KEYS: u16 = status::KEYS.start;
+const _: () = assert!(IMAGES == 8 && CRCS == 24 && KEYS == 28 && status::REVOKED == 32);
 
 /// Returns the bytes of the records of a block, in the order of the image.
 fn bytes_of(words: Words<'_>) -> [u8; BLOCK_BYTES] {

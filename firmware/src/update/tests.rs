@@ -66,6 +66,9 @@ impl InFlash for Flash {
     }
 }
 
+/// The numbers of the loader's keys. The first signed the running image.
+const KEYS: [u16; 4] = [0x1111, 0x2222, 0x3333, 0x4444];
+
 /// A unit, and the boot states that were written.
 struct Unit {
     update: Update,
@@ -82,10 +85,12 @@ impl Unit {
             preferred: Slot::A,
             states: [State::Confirmed, other],
             floor: 3,
+            bits: 0,
         };
-        let running = [0x0002, 0, 4, 0, 0, 300, 0, 0];
+        let running = [0x0002, 0, 4, 0, 0, 300, 0x1111, 0x2222, 0xAAAA, 0xBBBB];
+        let images = [running, [0; 10]];
         Self {
-            update: Update::new(1, &LAYOUT, Slot::A, Some(record), [running, [0; 8]], false),
+            update: Update::new(1, &LAYOUT, Slot::A, Some(record), images, KEYS, false),
             flash: Flash {
                 bytes: vec![0; LAYOUT.slot as usize],
                 erases: 0,
@@ -133,7 +138,7 @@ impl Unit {
     }
 
     fn order(&mut self, order: Order) {
-        assert_eq!(self.update.check(order), Ok(()));
+        assert!(self.update.check(order, 1).is_ok());
         self.update.take(order, LineName::Rs485);
         self.work();
     }
@@ -374,7 +379,7 @@ fn orders_need_a_confirmed_image_and_a_genuine_one_to_go_back_to() {
     let unit = Unit::new(State::Empty);
     let check = |unit: &Unit| {
         [Order::Prepare, Order::Finish, Order::Confirm, Order::GoBack]
-            .map(|order| unit.update.check(order).is_ok())
+            .map(|order| unit.update.check(order, 1).is_ok())
     };
     assert_eq!(check(&unit), [true, false, true, false]);
     // Rejected because the check was interrupted: it may be checked again.
@@ -386,7 +391,7 @@ fn orders_need_a_confirmed_image_and_a_genuine_one_to_go_back_to() {
     // Confirmed, but below the floor, and then not.
     let mut unit = Unit::new(State::Confirmed);
     assert_eq!(check(&unit), [true, false, true, false]);
-    unit.update.images[1][EPOCH] = 3;
+    unit.update.images[1][2] = 3;
     assert_eq!(check(&unit), [true, false, true, true]);
     unit.order(Order::GoBack);
     assert_eq!(unit.state()[1], 1, "no image is there");
@@ -409,6 +414,69 @@ fn orders_need_a_confirmed_image_and_a_genuine_one_to_go_back_to() {
         4,
         "the epoch of the image"
     );
+}
+
+#[test]
+fn image_by_the_second_key_ends_the_first_when_it_is_confirmed() {
+    let by = |unit: &mut Unit, image: usize, key: [u16; 2]| {
+        // Of the epoch of the floor.
+        unit.update.images[image][2] = 4;
+        unit.update.images[image][6..8].copy_from_slice(&key);
+    };
+    let [first, second] = [[0x1111, 0x2222], [0x3333, 0x4444]];
+    let mut unit = Unit::new(State::Confirmed);
+    by(&mut unit, 1, first);
+    by(&mut unit, 0, second);
+    assert!(unit.update.check(Order::GoBack, 1).is_ok());
+    unit.order(Order::Confirm);
+    assert_eq!(unit.update.record(status::REVOKED), 1);
+    assert!(
+        unit.update.check(Order::GoBack, 1).is_err(),
+        "the first key"
+    );
+    assert!(unit.update.check(Order::Prepare, 1).is_ok());
+    by(&mut unit, 1, second);
+    assert!(unit.update.check(Order::GoBack, 1).is_ok());
+    // A last resort by the first key is left by an update, and never confirmed.
+    by(&mut unit, 0, first);
+    assert!(unit.update.check(Order::Confirm, 1).is_err());
+    // A loader that does not say its keys: nothing is by the second.
+    let mut unit = Unit::new(State::Confirmed);
+    unit.update.keys = [0; 4];
+    by(&mut unit, 0, [0; 2]);
+    unit.order(Order::Confirm);
+    assert_eq!(unit.update.record(status::REVOKED), 0);
+}
+
+#[test]
+fn orders_that_begin_a_loop_cost_a_save() {
+    let costs = |state, order| {
+        let mut unit = Unit::new(state);
+        unit.update.images[1][2] = 4;
+        let left = [0, 1].map(|saves| unit.update.check(order, saves));
+        assert_eq!(left[0].is_ok(), left[1] == Ok(false), "{state:?} {order:?}");
+        left[1]
+    };
+    assert_eq!(costs(State::Empty, Order::Prepare), Ok(true));
+    assert_eq!(costs(State::Confirmed, Order::GoBack), Ok(true));
+    let again = State::Rejected(Reason::NotConfirmed);
+    assert_eq!(costs(again, Order::Finish), Ok(true));
+    assert_eq!(costs(State::Empty, Order::Confirm), Ok(false));
+    let mut unit = Unit::prepared();
+    unit.send_all(&image(7));
+    assert_eq!(unit.update.check(Order::Finish, 0), Ok(false));
+}
+
+/// The loader mends a lost boot state at the next start.
+#[test]
+fn unit_without_a_boot_state_takes_no_order() {
+    let images = [[1; 10]; 2];
+    let unit = Update::new(1, &LAYOUT, Slot::B, None, images, KEYS, false);
+    for order in [Order::Prepare, Order::Finish, Order::Confirm, Order::GoBack] {
+        assert!(unit.check(order, 1).is_err(), "{order:?}");
+    }
+    assert!(!unit.is_on_trial(), "it runs on");
+    assert_eq!(unit.record(status::SLOT), 2);
 }
 
 #[test]
@@ -437,7 +505,12 @@ fn register_and_file_2_report_the_unit() {
     unit.update.running.record.states[0] = State::Trial(2);
     assert_eq!(unit.update.register(), 1 | 6 << 2 | 1 << 5 | 1 << 6);
     let running = (8..16).map(|record| unit.update.record(record));
-    assert!(running.eq([2, 0, 4, 0, 0, 300, 0, 0]));
+    assert!(running.eq([2, 0, 4, 0, 0, 300, 0x1111, 0x2222]));
+    unit.update.images[1] = core::array::from_fn(|n| n as u16 + 1);
+    let other = (16..24).map(|record| unit.update.record(record));
+    assert!(other.eq(1..=8));
+    let behind = (24..34).map(|record| unit.update.record(record));
+    assert!(behind.eq([0xAAAA, 0xBBBB, 9, 10, 0x1111, 0x2222, 0x3333, 0x4444, 0, 0]));
     let fits = |first, count| {
         unit.update
             .check_read(Span::new(first, count).unwrap())

@@ -109,8 +109,8 @@ fn read(slot: &impl Slot, offset: usize) -> u16 {
     u16::from_le_bytes(bytes.first_chunk().copied().unwrap_or_default())
 }
 
-/// Returns what file 2 reports of the image in a slot, zero without one.
+/// Returns what file 2 reports of the image in a slot, and its CRC-32. Zero without an image.
 #[must_use]
-pub fn described(slot: &[u8]) -> [u16; 8] {
-    Header::of(slot).map_or([0; 8], |header| header.words())
+pub fn described(slot: &[u8]) -> [u16; 10] {
+    Header::of(slot).map_or([0; 10], |header| header.words())
 }

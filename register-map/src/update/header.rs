@@ -165,15 +165,16 @@ impl<'a> Header<'a> {
         rest.get(..self.length() as usize).ok_or(Reason::Length)
     }
 
-    /// Returns the records of file 2 that describe the image.
+    /// Returns the records of file 2 that describe the image, and behind them its CRC-32.
     #[must_use]
-    pub fn words(&self) -> [u16; 8] {
+    pub fn words(&self) -> [u16; 10] {
         let ([major, minor], patch) = self.version();
         let words = |long: u32| [(long >> 16) as u16, long as u16];
-        let ([c1, c0], [k1, k0]) = (words(self.commit()), words(self.key()));
+        let [c1, c0] = words(self.commit());
+        let ([k1, k0], [s1, s0]) = (words(self.key()), words(self.crc()));
         let version = u16::from_be_bytes([major, minor]);
         let blocks = self.blocks(usize::MAX).unwrap_or_default();
-        [version, patch, self.epoch(), c1, c0, blocks, k1, k0]
+        [version, patch, self.epoch(), c1, c0, blocks, k1, k0, s1, s0]
     }
 }
 
@@ -245,7 +246,9 @@ mod tests {
         assert_eq!(header.version(), ([0, 3], 4));
         assert_eq!((header.address(), header.length()), (0x0800_4000, 1024));
         assert_eq!(header.commit(), 0xABCD_1234);
-        assert_eq!(header.words(), [3, 4, 7, 0xABCD, 0x1234, 12, 0, 0]);
+        let crc = [(header.crc() >> 16) as u16, header.crc() as u16];
+        let words = [3, 4, 7, 0xABCD, 0x1234, 12, 0, 0, crc[0], crc[1]];
+        assert_eq!(header.words(), words);
         assert_eq!(header.suits(1, 0x0800_4000), Ok(()));
         assert_eq!(header.suits(2, 0x0800_4000), Err(Reason::Board));
         assert_eq!(header.suits(1, 0x0801_1800), Err(Reason::Address));

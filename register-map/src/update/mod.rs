@@ -1,6 +1,7 @@
 //! What an update over the line brings and reports: slots, their states, and the header of an image.
 
 mod header;
+pub mod keys;
 mod manifest;
 mod transfer;
 

@@ -59,6 +59,12 @@ pub mod status {
     pub const RUNNING: Range<u16> = 8..16;
     /// The image in the other slot. Zero if it has no header.
     pub const OTHER: Range<u16> = 16..24;
+    /// CRC-32 of the image that runs and of the one in the other slot, each high and low word.
+    pub const CRCS: Range<u16> = 24..28;
+    /// Numbers of the loader's two keys, each high and low word. Zero if the loader does not say them.
+    pub const KEYS: Range<u16> = 28..32;
+    /// Bit 0: the first key is revoked.
+    pub const REVOKED: u16 = 32;
     /// One bit for each block, lowest first: 1 is missing.
     pub const BITMAP: u16 = 64;
 }

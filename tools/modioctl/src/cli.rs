@@ -387,7 +387,7 @@ pub struct Export {
 #[derive(Args, Debug)]
 #[command(after_help = "\
 The units serve their points until they restart with the new firmware. It stays once they have reported it over this line; \
-otherwise the one before comes back, after 15 minutes at most. Nothing is sent unless the file suits every unit. After an \
+otherwise the one before comes back, after half an hour at most. Nothing is sent unless the file suits every unit. After an \
 interruption the same command goes on where it stopped.
 
 All units get the same blocks together, by broadcast. When anything answers a broadcast, when broadcasts do not arrive, and \

@@ -22,8 +22,10 @@ fn bench(own: OfSlot, lora: u16) -> Bench {
         preferred: Slot::A,
         states: [own, OfSlot::Empty],
         floor: 0,
+        bits: 0,
     };
-    let update = Update::new(1, &LAYOUT, Slot::A, Some(record), [[0; 8]; 2], false);
+    let images = [[0; 10]; 2];
+    let update = Update::new(1, &LAYOUT, Slot::A, Some(record), images, [0; 4], false);
     bench.device.update = Some(update);
     bench
 }
@@ -34,7 +36,7 @@ fn write_state(bench: &mut Bench) {
     let update = bench.device.update.as_mut().unwrap();
     let job = update.next().unwrap();
     assert!(matches!(job, Job::Write(_)));
-    update.end(&job, Done::Written(true), [0; 8]);
+    update.end(&job, Done::Written(true), [0; 10]);
 }
 
 #[test]
@@ -55,12 +57,23 @@ fn orders_need_the_lock_and_the_units_own_address() {
     assert_eq!(bench.write(at::COMMAND, &[PREPARE]), Err(6));
     bench.unlock();
     let own = Origin::default();
-    bench.device.set_origin(Origin {
+    let broadcast = Origin {
         broadcast: true,
         ..own
-    });
-    for code in CODES {
-        assert_eq!(bench.write(at::COMMAND, &[code]), Err(6), "{code:#x}");
+    };
+    let by_serial = Origin {
+        by_serial: true,
+        ..own
+    };
+    for origin in [broadcast, by_serial] {
+        bench.device.set_origin(origin);
+        for code in CODES {
+            assert_eq!(
+                bench.write(at::COMMAND, &[code]),
+                Err(6),
+                "{code:#x} {origin:?}"
+            );
+        }
     }
     bench.device.set_origin(own);
     assert_eq!(bench.write(at::COMMAND, &[0xB002]), Err(6), "no blocks");
@@ -86,6 +99,31 @@ fn preparation_costs_a_save_of_the_budget() {
     assert_eq!(bench.write(at::COMMAND, &[PREPARE]), Ok(()));
 }
 
+#[test]
+fn way_back_costs_a_save_of_the_budget() {
+    let mut bench = bench(OfSlot::Confirmed, 0);
+    let update = bench.device.update.as_mut().unwrap();
+    let confirmed = [OfSlot::Confirmed; 2];
+    *update = Update::new(
+        1,
+        &LAYOUT,
+        Slot::A,
+        Some(Record {
+            preferred: Slot::A,
+            states: confirmed,
+            floor: 0,
+            bits: 0,
+        }),
+        [[0; 10]; 2],
+        [0; 4],
+        false,
+    );
+    bench.device.config.set_saves_left(1);
+    bench.unlock();
+    assert_eq!(bench.write(at::COMMAND, &[0xB004]), Ok(()));
+    assert_eq!(bench.device.config.saves_left(), 0);
+}
+
 /// Each line's order waits for its own reply, so both may have been checked before one is carried out.
 #[test]
 fn order_that_was_checked_before_an_order_of_the_other_line_is_not_taken() {
@@ -104,8 +142,9 @@ fn order_that_was_checked_before_an_order_of_the_other_line_is_not_taken() {
     assert_eq!(bench.device.restart, Some(Restart::Update));
 }
 
+/// After 0xB007 a unit has no radio, so nobody could reach it over the air any more.
 #[test]
-fn preparation_over_the_air_needs_a_radio_with_settings() {
+fn preparation_over_the_air_needs_a_radio_with_settings_and_recovery_a_wire() {
     for (lora, answer) in [(1, Ok(())), (2, Err(6))] {
         let mut bench = bench(OfSlot::Confirmed, lora);
         bench.device.set_origin(Origin {
@@ -115,6 +154,8 @@ fn preparation_over_the_air_needs_a_radio_with_settings() {
         });
         let _ = bench.ask(&[6, 1, 0, 0x5A, 0x17]);
         assert_eq!(bench.write(at::COMMAND, &[PREPARE]), answer);
+        assert_eq!(bench.write(at::COMMAND, &[AS_255]), Err(6));
+        assert_eq!(bench.device.restart, None);
     }
 }
 
@@ -155,7 +196,7 @@ fn block_keeps_the_lock_open_and_needs_none() {
     while let Some(job) = bench.device.update.as_ref().unwrap().next() {
         use crate::update::Done;
         let update = bench.device.update.as_mut().unwrap();
-        update.end(&job, Done::Erased(true), [0; 8]);
+        update.end(&job, Done::Erased(true), [0; 10]);
     }
     bench.device.tick(59_000);
     assert_eq!(bench.ask(&block()), block());

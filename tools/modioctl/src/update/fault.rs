@@ -38,7 +38,7 @@ impl fmt::Display for Fault {
                 let name = names::exception(*code).unwrap_or("unknown exception");
                 let advice = match code {
                     6 => {
-                        "another command may be under way, or there were too many saves: wait a minute and run the same command again; over the air LORA must be 1"
+                        "another command may be under way, or there were too many saves: wait a minute and run the same command again; over the air LORA must be 1. Otherwise the key of that image is revoked, or its security epoch is below the floor"
                     }
                     _ => "its firmware may not fit this program",
                 };
@@ -70,7 +70,7 @@ impl fmt::Display for Fault {
                 "runs another image than this command sent: another program may update it; see `modioctl update --status`"
             }
             Self::NotConfirmed => {
-                "runs the image, but has not confirmed it: run the same command again within 15 minutes"
+                "runs the image, but has not confirmed it: run the same command again (the unit goes back after half an hour at most)"
             }
         })
     }

@@ -136,7 +136,7 @@ fn image(bytes: &[u8], slot: Slot) -> Result<(&'static Board, Image), String> {
         block
     });
     let blocks: Vec<_> = blocks.collect();
-    let words = header.words();
+    let [words @ .., _, _] = header.words();
     Ok((
         board,
         Image {

@@ -8,8 +8,8 @@ use std::path::Path;
 
 use f103::Image;
 use f103::memory::FLASH_BASE;
-use register_map::layout::{HEADER, LOADER};
-use register_map::update::{Header, Slot, State, crc32, intact};
+use register_map::layout::{HEADER, LOADER, LOADER_KEYS};
+use register_map::update::{Header, Slot, State, crc32, intact, keys};
 
 use super::{Board, Layout};
 
@@ -180,7 +180,7 @@ impl Layout {
         let mut flash = self.moved(old, &[(start, &image.bytes)]);
         loader.load(&mut flash, self.part.page_size)?;
         let boot = offset(self.board.layout().boot.first);
-        let record = boot_state(image.slot, &image.bytes);
+        let record = boot_state(image.slot, &image.bytes, &flash);
         flash[boot..boot + record.len()].copy_from_slice(&record);
         Ok(flash)
     }
@@ -205,7 +205,7 @@ impl Layout {
         let pages = &flash[boot..boot + 2 * layout.boot.bytes as usize];
         Slot::ALL.into_iter().any(|slot| {
             let slot_bytes = &flash[self.range(slot)];
-            let Some(rest) = pages.strip_prefix(&boot_state(slot, slot_bytes)[..]) else {
+            let Some(rest) = pages.strip_prefix(&boot_state(slot, slot_bytes, flash)[..]) else {
                 return false;
             };
             has_header(slot_bytes) && rest.iter().all(|byte| *byte == 0xFF)
@@ -221,16 +221,20 @@ fn has_header(slot: &[u8]) -> bool {
     Header::of(slot).is_ok()
 }
 
-/// Returns the boot state after the first start of an image, as the loader's journal writes it: the first record, with
-/// both seals.
-fn boot_state(slot: Slot, image: &[u8]) -> Vec<u8> {
+/// Returns the boot state after the first start of an image by the loader in this flash, as its journal writes it: the
+/// first record, with both seals. An image that the second key signed revokes the first.
+fn boot_state(slot: Slot, image: &[u8], flash: &[u8]) -> Vec<u8> {
     let confirmed = u16::from(State::Confirmed.code().0);
     let (preferred, states) = match slot {
         Slot::A => (0, confirmed << 8),
         Slot::B => (1, confirmed << 12),
     };
-    let floor = Header::of(image).map_or(0, |header| header.epoch());
-    let halves = [1, 0, preferred | states, 0, floor, RECORD_LAYOUT];
+    let [.., second] = keys::numbers(flash.get(offset(LOADER_KEYS)..).unwrap_or_default());
+    let header = Header::of(image);
+    let revoked = header.is_ok_and(|header| second != 0 && header.key() == second);
+    let floor = header.map_or(0, |header| header.epoch());
+    let bits = preferred | u16::from(revoked) << 1;
+    let halves = [1, 0, bits | states, 0, floor, RECORD_LAYOUT];
     let mut record: Vec<u8> = halves.iter().flat_map(|half| half.to_le_bytes()).collect();
     let crc = crc32([&record, &[]]);
     record.extend(crc.to_le_bytes());

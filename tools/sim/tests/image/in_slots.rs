@@ -39,23 +39,43 @@ pub fn image(slot: usize) -> Vec<u8> {
     BUILT[slot].clone()
 }
 
+/// A private development key: digits in hexadecimal.
+pub const FIRST_KEY: &str = include_str!("../../../../loader/keys/development.key");
+/// The second one, by whose image the first key is revoked.
+pub const SECOND_KEY: &str = include_str!("../../../../loader/keys/development-second.key");
+
 /// Returns the image for a slot with changes, and with the hash and the signature that belong to it.
 pub fn signed(slot: usize, change: impl FnOnce(&mut [u8])) -> Vec<u8> {
+    signed_by(FIRST_KEY, slot, change)
+}
+
+/// The same, with the signature of this key.
+pub fn signed_by(key: &str, slot: usize, change: impl FnOnce(&mut [u8])) -> Vec<u8> {
     let mut image = image(slot);
     change(&mut image);
     let hash = Sha512::digest(&image[APPLICATION..]);
     image[HASH..HASH + 64].copy_from_slice(&hash);
-    sign(&mut image);
+    image[KEY..KEY + 4].copy_from_slice(&number(key));
+    sign(&mut image, key);
     image
 }
 
-/// Gives an image the CRC-32 and the signature of the development key that belong to its header.
-pub fn sign(image: &mut [u8]) {
+/// Gives an image the CRC-32 and the signature of a key that belong to its header.
+pub fn sign(image: &mut [u8], key: &str) {
     with_crc(image);
-    let digits = include_str!("../../../../loader/keys/development.key").trim();
-    let key = core::array::from_fn(|n| u8::from_str_radix(&digits[2 * n..][..2], 16).unwrap());
-    let signature = SigningKey::from_bytes(&key).sign(&image[..SIGNATURE]);
+    let signature = pair(key).sign(&image[..SIGNATURE]);
     image[SIGNATURE..SIGNATURE + 64].copy_from_slice(&signature.to_bytes());
+}
+
+/// Returns the number of a key.
+pub fn number(key: &str) -> [u8; 4] {
+    let hash = Sha512::digest(pair(key).verifying_key());
+    core::array::from_fn(|n| hash[n])
+}
+
+fn pair(digits: &str) -> SigningKey {
+    let byte = |n| u8::from_str_radix(&digits[2 * n..][..2], 16).unwrap();
+    SigningKey::from_bytes(&core::array::from_fn(byte))
 }
 
 /// Gives an image the CRC-32 that belongs to it.

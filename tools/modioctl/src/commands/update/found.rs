@@ -134,7 +134,7 @@ impl Found {
         }
         if self.trial {
             return Err(format!(
-                "runs {} on trial: finish that update with its file, or wait 15 minutes until the unit goes back",
+                "runs {} on trial: finish that update with its file, or wait half an hour until the unit has gone back",
                 Version(runs)
             ));
         }
@@ -168,7 +168,7 @@ impl Found {
         } = &self.status;
         if self.trial {
             return Err(
-                "runs an image on trial: unless the image is confirmed, the unit goes back automatically within 15 minutes"
+                "runs an image on trial: unless the image is confirmed, the unit goes back automatically, after half an hour at most"
                     .to_owned(),
             );
         }

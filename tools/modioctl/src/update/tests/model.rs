@@ -166,7 +166,8 @@ impl Model {
                 self.blocks = blocks;
                 self.content = vec![None; blocks];
             }
-            self.images[1] = header.words();
+            let [words @ .., _, _] = header.words();
+            self.images[1] = words;
         }
         let begins = self.staged.last().map_or(now, |(end, _)| *end);
         self.staged.push((begins + BLOCK, block));

@@ -1,9 +1,10 @@
 //! An update over the line: blocks into the slot that does not run, the orders, and what follows them.
 //!
-//! `refused` has images that must not start, and attacks; `trial` what happens until an image is confirmed, and the ways
-//! back; `service` the points during an update; `cuts` the power cuts.
+//! `refused` has images that must not start, and attacks; `keys` the end of the first key; `trial` what happens until an
+//! image is confirmed, and the ways back; `service` the points during an update; `cuts` the power cuts.
 
 mod cuts;
+mod keys;
 mod refused;
 mod service;
 mod trial;
@@ -20,8 +21,9 @@ use sim::{Module, Time};
 use crate::LAYOUT;
 use crate::bench::{Bench, PAGE_SIZE, SLOT, adu};
 use crate::in_slots::{
-    APPLICATION, CHECK, HASH, LENGTH, SIGNATURE, START, answers, answers_as, fitted, flash,
-    holding, image, runs_from, sign, signed, unit, with_crc,
+    APPLICATION, CHECK, CRC, FIRST_KEY, HASH, LENGTH, SECOND_KEY, SIGNATURE, START, answers,
+    answers_as, fitted, flash, holding, image, number, runs_from, sign, signed, signed_by, unit,
+    with_crc,
 };
 use crate::saving::SLOWEST;
 

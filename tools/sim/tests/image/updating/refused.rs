@@ -14,7 +14,7 @@ fn refused_images() -> [(&'static str, u16, Vec<u8>); 7] {
         image
     };
     let signed = |mut image: Vec<u8>| {
-        sign(&mut image);
+        sign(&mut image, FIRST_KEY);
         image
     };
     [
