@@ -514,7 +514,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
         self.saves.left()
     }
 
-    /// Returns the number of saves in the budget without the one that a save under way will take.
+    /// Returns how many saves are left for others: a save under way takes one more from the budget.
     #[must_use]
     pub fn spare_saves(&self) -> u8 {
         self.saves.left().saturating_sub(self.has_save().into())

@@ -34,8 +34,7 @@ pub fn words(bytes: &[u8; BYTES]) -> [u16; 4] {
 /// Returns the numbers at the beginning of these bytes, zeros if there are none.
 #[must_use]
 pub fn numbers(bytes: &[u8]) -> [u32; 2] {
-    let words = bytes.first_chunk().map_or([0; 4], words);
-    let [[a, b], [c, d]] = [[words[0], words[1]], [words[2], words[3]]];
+    let [a, b, c, d] = bytes.first_chunk().map_or([0; 4], words);
     [[a, b], [c, d]].map(|[high, low]| u32::from(high) << 16 | u32::from(low))
 }
 
@@ -48,6 +47,7 @@ mod tests {
         let right = encode([0x11FA_5AB8, 0xABCD_0123]);
         assert_eq!(&right[..10], b"MODK\x01\0\0\0\x11\xFA");
         assert_eq!(words(&right), [0x11FA, 0x5AB8, 0xABCD, 0x0123]);
+        assert_eq!(numbers(&right), [0x11FA_5AB8, 0xABCD_0123]);
         for byte in 0..8 {
             let mut other = right;
             other[byte] ^= 1;
