@@ -8,22 +8,22 @@ use std::process::Command;
 use anyhow::{Context as _, Result};
 use ed25519_dalek::{SigningKey, VerifyingKey};
 use fs_err as fs;
-use object::{Object as _, ObjectSection as _};
-use register_map::part::FLASH_BASE;
-use register_map::{Board, update::Slot};
+use register_map::Board;
 use sha2::{Digest as _, Sha256};
 
-use crate::build::Program;
 use crate::error::usage;
-use crate::image::Elf;
+use crate::sources::Sources;
 use crate::toolchain::TARGET;
 use crate::workspace::Workspace;
-use crate::{build, command, flash, hex, image, keys, signed};
+use crate::{command, keys};
 
+mod board;
 mod notices;
 mod paths;
 mod programs;
 mod sbom;
+mod signing;
+mod tag;
 
 use notices::Notices;
 use paths::Paths;
@@ -36,9 +36,14 @@ pub struct Options {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 
-    /// Build only if this is the tag of the sources' version and no file differs from the commit
+    /// Build only if this is the tag of the sources' version, at this commit, and the security epoch follows that of the
+    /// tag before
     #[arg(long, value_name = "TAG")]
     tag: Option<String>,
+
+    /// Let --tag accept an epoch that is more than one higher than that of the tag before
+    #[arg(long, requires = "tag")]
+    epoch_jump: bool,
 
     /// Build only the programs, with loader and images of this directory in the simulator; this needs no key
     #[arg(long, value_name = "DIR")]
@@ -47,42 +52,52 @@ pub struct Options {
     #[command(flatten)]
     keys: keys::Release,
 
-    /// Security epoch of the images
-    #[arg(long, value_name = "NUMBER", default_value_t = 0)]
-    epoch: u16,
+    /// Build everything but what needs a signature, and write the bytes to be signed, 92 in each file *.tbs; this needs
+    /// no key
+    #[arg(long, conflicts_with_all = ["images", "key", "signed", "signatures"])]
+    unsigned: bool,
+
+    /// Make the release from the files of --unsigned in DIR, with the signatures of --signatures; this needs no key
+    #[arg(long, value_name = "DIR", requires = "signatures", conflicts_with_all = ["images", "key", "signed"])]
+    files: Option<PathBuf>,
+
+    /// The signatures, 64 bytes in each file *.sig
+    #[arg(long, value_name = "DIR", requires = "files")]
+    signatures: Option<PathBuf>,
 
     /// Take the signatures from the files BOARD.modio of this directory, those of a release, instead of signing: to
     /// build the same bytes without the key
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["images", "key", "epoch"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["images", "key"])]
     signed: Option<PathBuf>,
 }
 
 /// What signs the images.
 enum Signer {
-    Key(SigningKey, u16),
+    /// Nothing: the bytes to be signed are written.
+    Nobody,
+    Key(SigningKey),
     /// A directory with the signed images of the same sources, and the public keys.
     Signed(PathBuf, [VerifyingKey; 2]),
 }
 
-/// The tag of this version. All packages have the workspace's version.
-const TAG: &str = concat!("v", env!("CARGO_PKG_VERSION"));
-
 /// `cargo xtask dist`.
 pub fn run(workspace: &Workspace, options: &Options) -> Result<()> {
-    if let Some(tag) = &options.tag {
-        check_tag(tag, register_map::commit!())?;
-    }
     // Before the builds, which take long.
-    let signer = match options.images {
-        None => {
-            let (public, file) = options.keys.public(workspace)?;
-            let signer = match &options.signed {
-                Some(directory) => Signer::Signed(directory.clone(), public),
-                None => Signer::Key(options.keys.private(workspace, &public)?, options.epoch),
-            };
-            Some((signer, file))
-        }
+    let sources = workspace.sources()?;
+    tag::check_commit(&sources)?;
+    if let Some(tag) = &options.tag {
+        tag::check(&workspace.root, tag, &sources, options.epoch_jump)?;
+    }
+    let keys = match options.images {
+        None => Some(options.keys.public(workspace)?),
         Some(_) => None,
+    };
+    let signer = match (&keys, &options.signed) {
+        (Some((public, _)), Some(directory)) => Signer::Signed(directory.clone(), *public),
+        (Some((public, _)), None) if !options.unsigned && options.files.is_none() => {
+            Signer::Key(options.keys.private(workspace, public)?)
+        }
+        _ => Signer::Nobody,
     };
     let standard = workspace.target.join("dist");
     if options.out.is_none() {
@@ -97,151 +112,58 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<()> {
     let target = programs::target(&rustc(&["--print", "host-tuple"])?);
     let workspace = &mut paths.reproducible(workspace, &target);
     let mut notices = Notices::default();
-    if let Some((signer, public)) = signer {
-        workspace.keys = Some(public);
-        for board in Board::ALL {
-            let mut release = Release {
-                workspace: &mut *workspace,
-                board,
-                out: &out,
-                paths: &paths,
-                notices: &mut notices,
-            };
-            release.files(&signer)?;
+    match (keys, &options.files, &options.signatures) {
+        (Some((public, _)), Some(files), Some(signatures)) => {
+            signing::finish(files, signatures, &sources, (&public, &options.keys), &out)?;
         }
-        let root = &workspace.root;
-        for name in ["LICENSE-APACHE", "LICENSE-MIT"] {
-            fs::copy(root.join(name), out.join(name))?;
+        (Some((_, file)), ..) => {
+            workspace.keys = Some(file);
+            for board in Board::ALL {
+                let mut release = board::Files {
+                    workspace: &mut *workspace,
+                    sources: &sources,
+                    board,
+                    out: &out,
+                    paths: &paths,
+                    notices: &mut notices,
+                };
+                release.make(&signer)?;
+            }
+            // Those of the programs are in another file.
+            core::mem::take(&mut notices).write(TARGET, &out)?;
+            texts(workspace, &sources, &out)?;
+            if options.unsigned {
+                return write_sums(&out);
+            }
         }
-        let sysroot = rustc(&["--print", "sysroot"])?;
-        let library = Path::new(&sysroot).join("share/doc/rust/COPYRIGHT-library.html");
-        fs::copy(library, out.join("THIRD-PARTY-rust-std.html"))?;
-        let changes = fs::read_to_string(root.join("CHANGELOG.md"))?;
-        let section = section(&changes, env!("CARGO_PKG_VERSION"))?;
-        fs::write(out.join("RELEASE-NOTES.md"), section)?;
+        _ => {}
     }
     let images = options.images.as_ref().unwrap_or(&out);
     programs::files(workspace, &target, images, &out, &mut notices)?;
     notices.write(&target, &out)?;
-    let sums = sums(&out)?;
+    write_sums(&out)
+}
+
+/// Writes licences and release notes.
+fn texts(workspace: &Workspace, sources: &Sources, out: &Path) -> Result<()> {
+    let root = &workspace.root;
+    for name in ["LICENSE-APACHE", "LICENSE-MIT"] {
+        fs::copy(root.join(name), out.join(name))?;
+    }
+    let sysroot = rustc(&["--print", "sysroot"])?;
+    let library = Path::new(&sysroot).join("share/doc/rust/COPYRIGHT-library.html");
+    fs::copy(library, out.join("THIRD-PARTY-rust-std.html"))?;
+    let changes = fs::read_to_string(root.join("CHANGELOG.md"))?;
+    let section = section(&changes, &sources.version.to_string())?;
+    Ok(fs::write(out.join("RELEASE-NOTES.md"), section)?)
+}
+
+/// Writes and shows the check sums of all files.
+fn write_sums(out: &Path) -> Result<()> {
+    let sums = sums(out)?;
     fs::write(out.join("SHA256SUMS"), &sums)?;
     say!("{sums}{}", out.join("SHA256SUMS").display());
     Ok(())
-}
-
-/// Refuses a tag of another version, and sources that no commit has.
-fn check_tag(tag: &str, commit: &str) -> Result<()> {
-    if tag != TAG {
-        return Err(usage(format!(
-            "the tag {tag} is not the tag of these sources, {TAG}"
-        )));
-    }
-    if commit.ends_with("-dirty") || commit == "unknown" {
-        return Err(usage(format!(
-            "the commit of these sources is {commit}; a tag needs a commit without changes"
-        )));
-    }
-    Ok(())
-}
-
-/// The files of a board.
-struct Release<'a> {
-    workspace: &'a mut Workspace,
-    board: &'static Board,
-    out: &'a Path,
-    paths: &'a Paths,
-    notices: &'a mut Notices,
-}
-
-impl Release<'_> {
-    /// Makes the files: the image that runs alone, the loader, the application for both slots, the file of an update,
-    /// and loader and slot A for a programmer.
-    fn files(&mut self, signer: &Signer) -> Result<()> {
-        let board = self.board;
-        let (alone, entry) = self.program(Program::Alone, board.name)?;
-        self.write(
-            &format!("{board}.hex"),
-            hex::file(&[(FLASH_BASE, alone.clone())], entry)?,
-        )?;
-        self.write(&format!("{board}.bin"), alone)?;
-        let (loader, entry) = self.program(Program::Loader, &format!("{board}-loader"))?;
-        let mut images = Vec::new();
-        for (slot, letter) in Slot::ALL.into_iter().zip(["a", "b"]) {
-            let name = format!("{board}-{letter}");
-            self.program(Program::Slot(slot), &name)?;
-            let elf = fs::read(self.out.join(format!("{name}.elf")))?;
-            let mut image = signed::unsigned(board, slot, &elf)?;
-            match signer {
-                Signer::Key(key, epoch) => signed::sign(&mut image, key, *epoch),
-                Signer::Signed(directory, public) => {
-                    let file = directory.join(format!("{board}.modio"));
-                    let images = signed::images(&fs::read(&file)?);
-                    let signed = images.and_then(|images| {
-                        signed::sign_as(&mut image, &images[slot as usize], public)
-                    });
-                    signed.with_context(|| file.display().to_string())?;
-                }
-            }
-            images.push(image);
-        }
-        let [a, b]: [Vec<u8>; 2] = images.try_into().ok().context("two slots")?;
-        let complete = flash::loaded(board, Slot::A, loader, a.clone());
-        self.write(
-            &format!("{board}-complete.hex"),
-            hex::file(&complete, entry)?,
-        )?;
-        self.write(&format!("{board}.modio"), signed::file(&[a, b]))
-    }
-
-    /// Builds a program, and writes its ELF file, its bill of materials and for the application its map. Returns its
-    /// flash, and its start address.
-    fn program(&mut self, program: Program, name: &str) -> Result<(Vec<u8>, u32)> {
-        let (package, map) = match program {
-            Program::Loader => ("loader", None),
-            Program::Slot(_) | Program::Alone => {
-                let map = self.workspace.target.join(format!("{name}.map"));
-                ("firmware", Some(map))
-            }
-        };
-        let built = build::program(self.workspace, self.board, program, map.as_deref())?;
-        let elf = fs::read(&built.elf)?;
-        let flash = fs::read(built.elf.with_extension("bin"))?;
-        let parsed = image::parse(&elf)?;
-        let entry = parsed.entry() as u32;
-        let bill = sbom::Subject {
-            name,
-            kind: "firmware",
-            package,
-            target: TARGET,
-            features: format!("{package}/{}", self.board),
-            compiled: &built.packages,
-            compiler: &compiler(&parsed)?,
-            sha256: sha256(&flash),
-        };
-        let bill = bill.bill(self.workspace, self.notices)?;
-        self.write(&format!("{name}.cdx.json"), bill)?;
-        if let Some(map) = map {
-            let map = self.paths.replaced(&fs::read_to_string(map)?);
-            self.write(&format!("{name}.map"), map)?;
-        }
-        self.write(&format!("{name}.elf"), elf)?;
-        Ok((flash, entry))
-    }
-
-    fn write(&self, name: &str, content: impl AsRef<[u8]>) -> Result<()> {
-        Ok(fs::write(self.out.join(name), content)?)
-    }
-}
-
-/// Returns the version of the rustc that has compiled an image, from a comment in the image.
-fn compiler(elf: &Elf<'_>) -> Result<String> {
-    let comment = elf.section_by_name(".comment");
-    let comment = comment.and_then(|section| section.data().ok());
-    let comment = String::from_utf8_lossy(comment.unwrap_or_default());
-    let mut texts = comment.split('\0');
-    let version = texts.find_map(|text| text.strip_prefix("rustc version "));
-    let version = version.context("the image has no comment with its compiler")?;
-    Ok(version.to_owned())
 }
 
 /// Returns the section of a version in a changelog, without its heading.
@@ -301,20 +223,6 @@ mod tests {
         assert_eq!(section(changes, "0.1.0").unwrap(), "- B.\n");
         for absent in ["0.2", "Unreleased"] {
             assert!(section(changes, absent).is_err(), "{absent}");
-        }
-        let changes = include_str!("../../CHANGELOG.md");
-        assert!(section(changes, env!("CARGO_PKG_VERSION")).is_ok());
-    }
-
-    #[test]
-    fn tag_needs_its_version_and_a_commit_without_changes() {
-        assert!(check_tag(TAG, "1a2b3c4d").is_ok());
-        for (tag, commit) in [
-            ("v9.9.9", "1a2b3c4d"),
-            (TAG, "1a2b3c4d-dirty"),
-            (TAG, "unknown"),
-        ] {
-            assert!(check_tag(tag, commit).is_err(), "{tag} {commit}");
         }
     }
 }

@@ -16,7 +16,7 @@ use register_map::{Board, record};
 
 use crate::error::usage;
 use crate::workspace::Workspace;
-use crate::{build, command, debug, hex, image, signed};
+use crate::{build, command, debug, hex, image, keys, signed};
 
 /// Bytes at addresses of the flash.
 pub type Regions = Vec<(u32, Vec<u8>)>;
@@ -44,6 +44,9 @@ pub struct Options {
     #[command(flatten)]
     signature: signed::How,
 
+    #[command(flatten)]
+    keys: keys::Trusted,
+
     /// Write the image that runs without a loader. `--elf` writes such an image, too
     #[arg(long, conflicts_with_all = ["slot", "key", "epoch"])]
     plain: bool,
@@ -69,6 +72,7 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
             "stm32flash is not installed (on Debian: apt-get install stm32flash)"
         ),
     }
+    options.keys.apply(workspace)?;
     let board = options.board.given.board();
     let (mut regions, entry) = options.regions(workspace)?;
     let read = |address, length| options.read(workspace, address, length);
@@ -167,6 +171,7 @@ impl Options {
             );
             return Ok((vec![(FLASH_BASE, bytes)], entry));
         }
+        keys::check_loader(workspace, self.signature.key())?;
         let (loader, entry) = flat(&build::loader(workspace, board)?)?;
         let signed = signed::Options::signed(board, self.signature.clone());
         let image = signed::image(workspace, &signed, self.slot)?;

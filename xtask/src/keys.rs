@@ -1,9 +1,12 @@
-//! The keys of updates: 64 hexadecimal digits. A private key signs images; the loader has the public halves of two.
+//! The keys of updates. A private key signs images: PKCS#8 in PEM, as openssl reads it, or 64 hexadecimal digits. The
+//! loader has the public halves of two, 64 digits each.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result, ensure};
+use anyhow::{Context as _, Result, anyhow, ensure};
+use ed25519_dalek::pkcs8::spki::der::pem::LineEnding;
+use ed25519_dalek::pkcs8::{DecodePrivateKey as _, EncodePrivateKey as _, KeypairBytes};
 use ed25519_dalek::{SigningKey, VerifyingKey};
 use fs_err as fs;
 use sha2::{Digest as _, Sha512};
@@ -18,30 +21,90 @@ const DEVELOPMENT_PUBLIC: &str = include_str!("../../loader/keys/development.pub
 /// The public keys of the loader in a release.
 const PRODUCTION: &str = "loader/keys/production.pub";
 
-/// The file of a new key.
+/// The file of a new key, or of one whose public half is shown.
 #[derive(clap::Args, Debug)]
 pub struct New {
     /// A file that does not exist yet
-    #[arg(value_name = "FILE")]
-    file: PathBuf,
+    #[arg(value_name = "FILE", required_unless_present = "public")]
+    file: Option<PathBuf>,
+
+    /// Show the public half of the private key in this file, and make none
+    #[arg(long, value_name = "FILE", conflicts_with = "file")]
+    public: Option<PathBuf>,
+}
+
+/// The public keys that a loader is built with.
+#[derive(clap::Args, Clone, Debug, Default)]
+#[group(skip)]
+pub struct Trusted {
+    /// The two public keys that the loader trusts, a line for each; without them the development keys, which everybody
+    /// has
+    #[arg(long, value_name = "FILE", env = "MODIO_KEYS")]
+    keys: Option<PathBuf>,
+}
+
+impl Trusted {
+    /// Passes the keys to the builds.
+    pub fn apply(&self, workspace: &mut Workspace) -> Result<()> {
+        if let Some(file) = &self.keys {
+            workspace.keys = Some(std::path::absolute(file)?);
+        }
+        Ok(())
+    }
 }
 
 /// The keys of a release.
 #[derive(clap::Args, Clone, Debug)]
 #[group(skip)]
 pub struct Release {
-    /// Private key that signs the images [default: the content of the variable MODIO_SIGNING_KEY]
+    /// Private key that signs the images, for a release of your own. CI builds with --unsigned and signs without
+    /// the sources
     #[arg(long, value_name = "FILE")]
     key: Option<PathBuf>,
 
     /// The two public keys that the loader trusts, a line for each [default: loader/keys/production.pub]
     #[arg(long, value_name = "FILE", env = "MODIO_KEYS")]
     keys: Option<PathBuf>,
+
+    /// The second key signs, to end the first one in every unit that confirms these images, for good
+    #[arg(long)]
+    end_first_key: bool,
+}
+
+/// Refuses images by the second key that are not meant to end the first one, and images that are and do not. `keys` are
+/// those of the loader.
+pub fn check_second(
+    keys: &[VerifyingKey; 2],
+    by: &VerifyingKey,
+    end_first_key: bool,
+) -> Result<()> {
+    let [_, second] = keys;
+    match (by == second, end_first_key) {
+        (true, false) => Err(usage(
+            "the second key signs only images that end the first one in every unit that confirms them, for good; \
+             --end-first-key says that this is meant",
+        )),
+        (false, true) => Err(usage(
+            "--end-first-key: the first key signs these images, which ends nothing",
+        )),
+        _ => Ok(()),
+    }
 }
 
 /// `cargo xtask keygen`.
-pub fn generate(new: &New) -> Result<()> {
-    let path = &new.file;
+pub fn run(workspace: &Workspace, options: &New) -> Result<()> {
+    match (&options.file, &options.public) {
+        (Some(file), _) => generate(file),
+        (None, file) => {
+            let key = read(workspace, file.as_deref())?;
+            say!("{}", digits(key.verifying_key().as_bytes()));
+            Ok(())
+        }
+    }
+}
+
+/// Makes a private key in a new file, and shows its public half.
+pub fn generate(path: &Path) -> Result<()> {
     let mut bytes = [0; 32];
     getrandom::fill(&mut bytes).context("the system has no random numbers")?;
     let mut options = fs::OpenOptions::new();
@@ -50,7 +113,14 @@ pub fn generate(new: &New) -> Result<()> {
     fs_err::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
     let file = options.open(path);
     let mut file = file.map_err(|error| usage(error.to_string()))?;
-    writeln!(file, "{}", digits(&bytes))?;
+    // Without the public half, which openssl 3.0 refuses there.
+    let pair = KeypairBytes {
+        secret_key: bytes,
+        public_key: None,
+    };
+    let pem = pair.to_pkcs8_pem(LineEnding::LF);
+    let pem = pem.map_err(|error| anyhow!("no PEM of a key: {error}"))?;
+    file.write_all(pem.as_bytes())?;
     let public = SigningKey::from_bytes(&bytes).verifying_key();
     say!("{}", digits(public.as_bytes()));
     eprintln!(
@@ -69,6 +139,55 @@ pub fn read(workspace: &Workspace, path: Option<&Path>) -> Result<SigningKey> {
     private(&text).map_err(|why| usage(format!("{}: {why:#}", path.display())))
 }
 
+/// The same for a file that is signed again. The keys are those of `MODIO_KEYS`, of a release, or the development keys.
+pub fn check_second_of(
+    workspace: &Workspace,
+    by: &VerifyingKey,
+    end_first_key: bool,
+) -> Result<()> {
+    let production = workspace.root.join(PRODUCTION);
+    let lines = match &workspace.keys {
+        Some(file) => fs::read_to_string(file)?,
+        None if production.exists() => fs::read_to_string(production)?,
+        None => DEVELOPMENT_PUBLIC.to_owned(),
+    };
+    let key = |line| VerifyingKey::from_bytes(&bytes(line)?).ok();
+    let keys: Option<Vec<_>> = lines.lines().map(key).collect();
+    match keys.and_then(|keys| <[VerifyingKey; 2]>::try_from(keys).ok()) {
+        Some(keys) => check_second(&keys, by, end_first_key),
+        None => Ok(()),
+    }
+}
+
+/// Refuses a private key, or the development key, that the loader does not trust: it would never start the image. Says
+/// when a unit will take firmware of anybody.
+pub fn check_loader(workspace: &Workspace, key: Option<&Path>) -> Result<()> {
+    let own = digits(read(workspace, key)?.verifying_key().as_bytes());
+    let file = workspace.keys.as_deref();
+    let trusted = match file {
+        Some(file) => fs::read_to_string(file).map_err(|error| usage(error.to_string()))?,
+        None => DEVELOPMENT_PUBLIC.to_owned(),
+    };
+    if trusted.lines().all(|line| line != own) {
+        let of = file.map_or("the development keys".into(), |file| {
+            file.display().to_string()
+        });
+        return Err(usage(format!(
+            "the loader would not start this image: it trusts {of}, and another key signs; --keys and --key belong together"
+        )));
+    }
+    if DEVELOPMENT_PUBLIC
+        .lines()
+        .any(|line| trusted.contains(line))
+    {
+        eprintln!(
+            "xtask: this unit takes firmware from anybody on its line, because everybody has the development keys; \
+             docs/update.md says how to make your own"
+        );
+    }
+    Ok(())
+}
+
 impl Release {
     /// Returns the public keys, and their file.
     pub fn public(&self, workspace: &Workspace) -> Result<([VerifyingKey; 2], PathBuf)> {
@@ -84,21 +203,19 @@ impl Release {
         Ok((keys, std::path::absolute(path)?))
     }
 
+    /// As the function of this name.
+    pub fn check_second(&self, keys: &[VerifyingKey; 2], by: &VerifyingKey) -> Result<()> {
+        check_second(keys, by, self.end_first_key)
+    }
+
     /// Returns the private key, which must be that of one of the public keys.
-    pub fn private(&self, workspace: &Workspace, public: &[VerifyingKey]) -> Result<SigningKey> {
-        let variable = std::env::var("MODIO_SIGNING_KEY");
-        let key = match (&self.key, variable) {
-            (Some(path), _) => read(workspace, Some(path))?,
-            (None, Ok(text)) if !text.is_empty() => private(&text)
-                .map_err(|why| usage(format!("the variable MODIO_SIGNING_KEY: {why:#}")))?,
-            _ => {
-                return Err(usage(
-                    "no key to sign with: --key FILE, or the variable MODIO_SIGNING_KEY; `cargo xtask keygen FILE` \
-                     makes one",
-                ));
-            }
-        };
+    pub fn private(&self, workspace: &Workspace, public: &[VerifyingKey; 2]) -> Result<SigningKey> {
+        let path = self.key.as_ref().ok_or_else(|| {
+            usage("no key to sign with: --key FILE, which `cargo xtask keygen FILE` makes, or --unsigned")
+        })?;
+        let key = read(workspace, Some(path))?;
         check(&key.verifying_key(), public).map_err(|why| usage(why.to_string()))?;
+        self.check_second(public, &key.verifying_key())?;
         Ok(key)
     }
 }
@@ -110,6 +227,11 @@ fn public(text: &str) -> Result<[VerifyingKey; 2]> {
     let keys = keys.and_then(|keys| <[VerifyingKey; 2]>::try_from(keys).ok());
     let keys = keys.context("two lines of 64 hexadecimal digits are needed, the public keys")?;
     keys.iter().try_for_each(refuse_development)?;
+    let [first, second] = keys.each_ref().map(|key| first_bytes(key.as_bytes()));
+    ensure!(
+        first != second,
+        "both keys have the same number: the second one must be another key, which ends the first"
+    );
     Ok(keys)
 }
 
@@ -140,9 +262,14 @@ pub fn first_bytes(public: &[u8; 32]) -> [u8; 4] {
     [a, b, c, d]
 }
 
-fn private(text: &str) -> Result<SigningKey> {
-    let bytes = bytes(text.trim());
-    let bytes = bytes.context("not a private key: 64 hexadecimal digits are needed")?;
+pub fn private(text: &str) -> Result<SigningKey> {
+    let text = text.trim();
+    if text.starts_with("-----BEGIN") {
+        return SigningKey::from_pkcs8_pem(text)
+            .map_err(|_| anyhow!("not a private key: an Ed25519 key in PKCS#8 is needed"));
+    }
+    let bytes = bytes(text);
+    let bytes = bytes.context("not a private key: 64 hexadecimal digits or PEM are needed")?;
     Ok(SigningKey::from_bytes(&bytes))
 }
 
@@ -168,21 +295,19 @@ mod tests {
     #[test]
     fn new_key_is_random_and_private_and_never_replaces_a_file() {
         let directory = tempfile::tempdir().unwrap();
-        let new = ["a", "b"].map(|name| New {
-            file: directory.path().join(name),
-        });
+        let new = ["a", "b"].map(|name| directory.path().join(name));
         new.iter().for_each(|new| generate(new).unwrap());
         let [a, b] = new
             .each_ref()
-            .map(|new| read(&workspace(), Some(&new.file)).unwrap());
+            .map(|new| read(&workspace(), Some(new)).unwrap());
         assert_ne!(a, b);
         let error = generate(&new[0]).unwrap_err();
         assert!(error.is::<crate::error::Usage>(), "{error}");
-        assert_eq!(read(&workspace(), Some(&new[0].file)).unwrap(), a);
+        assert_eq!(read(&workspace(), Some(&new[0])).unwrap(), a);
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt as _;
-            let mode = new[0].file.metadata().unwrap().permissions().mode();
+            let mode = new[0].metadata().unwrap().permissions().mode();
             assert_eq!(mode & 0o777, 0o600);
         }
     }
@@ -206,16 +331,46 @@ mod tests {
             assert!(text.contains(part), "{text}");
         };
         refused(check(&other, &trusted), "belongs to none");
+        assert!(check_second(&trusted, &own, false).is_ok());
+        assert!(check_second(&trusted, &safe, true).is_ok());
+        refused(check_second(&trusted, &safe, false), "--end-first-key says");
+        refused(check_second(&trusted, &own, true), "ends nothing");
         refused(check(&development, &trusted), "everybody");
         refused(lines(&[&own, &development]).map(drop), "everybody");
         refused(check(&second, &trusted), "everybody");
         refused(lines(&[&own]).map(drop), "two lines");
+        refused(lines(&[&own, &own]).map(drop), "same number");
         let missing = Release {
             key: None,
             keys: Some("/nowhere/keys".into()),
+            end_first_key: false,
         };
         let error = missing.public(&workspace()).unwrap_err();
         assert!(error.is::<crate::error::Usage>(), "{error}");
+    }
+
+    #[test]
+    fn image_that_the_loader_would_not_start_is_refused_before_it_is_written() {
+        let directory = tempfile::tempdir().unwrap();
+        let [own, other, lines] = ["own", "other", "keys"].map(|name| directory.path().join(name));
+        let both = [&own, &other].map(|file| {
+            generate(file).unwrap();
+            let key = read(&workspace(), Some(file)).unwrap();
+            digits(key.verifying_key().as_bytes()) + "\n"
+        });
+        fs::write(&lines, both[0].repeat(2)).unwrap();
+        let mut of_own = workspace();
+        of_own.keys = Some(lines.clone());
+        assert!(check_loader(&of_own, Some(&own)).is_ok());
+        for (workspace, key) in [
+            (&of_own, Some(&*other)),
+            (&of_own, None),
+            (&workspace(), Some(&own)),
+        ] {
+            let error = check_loader(workspace, key).unwrap_err();
+            assert!(error.is::<crate::error::Usage>(), "{error}");
+        }
+        assert!(check_loader(&workspace(), None).is_ok());
     }
 
     #[test]

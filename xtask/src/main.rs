@@ -44,10 +44,13 @@ mod signed;
 mod sim;
 mod size;
 mod soak;
+mod sources;
 mod steps;
 mod table;
 mod test;
 mod toolchain;
+#[cfg(test)]
+mod workflows;
 mod workspace;
 
 /// The command line of `cargo xtask`.
@@ -146,7 +149,7 @@ fn run(cli: Cli) -> Result<()> {
         Command::Build(options) => build::run(workspace, &options),
         Command::Image(options) => signed::run(workspace, &options),
         Command::Sign(options) => signed::again(workspace, &options),
-        Command::Keygen(new) => keys::generate(&new),
+        Command::Keygen(new) => keys::run(workspace, &new),
         Command::Flash(options) => flash::run(workspace, &options),
         Command::Run(options) => debug::run(workspace, &options),
         Command::Attach(options) => debug::attach(workspace, &options),

@@ -1,6 +1,6 @@
 //! `cargo xtask image` and `sign`: the file of an update, with the signed images for both slots.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, anyhow, ensure};
 use ed25519_dalek::{Signature, Signer as _, SigningKey, VerifyingKey};
@@ -9,11 +9,11 @@ use register_map::layout::HEADER;
 use register_map::part::FLASH_BASE;
 use register_map::update::{BLOCK_BYTES, Manifest, Slot, crc32, intact};
 use register_map::{Board, first_32_bits};
-use semver::Version;
 use sha2::{Digest as _, Sha512};
 
 use crate::build::Program;
 use crate::error::usage;
+use crate::sources::Sources;
 use crate::workspace::Workspace;
 use crate::{build, image, keys};
 
@@ -39,9 +39,17 @@ pub struct How {
     #[arg(long, value_name = "FILE")]
     key: Option<PathBuf>,
 
-    /// Security epoch: once an image is confirmed, no image with a lower one is accepted
-    #[arg(long, value_name = "NUMBER", default_value_t = 0)]
-    epoch: u16,
+    /// Security epoch: once an image is confirmed, no image with a lower one is accepted [default: that in the root
+    /// Cargo.toml]
+    #[arg(long, value_name = "NUMBER")]
+    epoch: Option<u16>,
+}
+
+impl How {
+    /// Returns the file of the private key, if it is not the development key.
+    pub fn key(&self) -> Option<&Path> {
+        self.key.as_deref()
+    }
 }
 
 /// The options of `cargo xtask sign`.
@@ -53,6 +61,10 @@ pub struct Again {
 
     #[command(flatten)]
     signature: How,
+
+    /// The second key signs, to end the first one in every unit that confirms this image, for good
+    #[arg(long)]
+    end_first_key: bool,
 
     /// Where to write the signed file; without it the file is replaced
     #[arg(long, value_name = "FILE")]
@@ -77,6 +89,11 @@ impl Options {
 
 /// `cargo xtask image`.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
+    if options.signature.key.is_none() {
+        eprintln!(
+            "xtask: signed with the development key, which everybody has; --key FILE names another"
+        );
+    }
     let (_, file) = update(workspace, options)?;
     say!("{}", file.display());
     Ok(())
@@ -86,12 +103,24 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
 pub fn again(workspace: &Workspace, options: &Again) -> Result<()> {
     let How { key, epoch } = &options.signature;
     let key = keys::read(workspace, key.as_deref())?;
+    keys::check_second_of(workspace, &key.verifying_key(), options.end_first_key)?;
     let path = &options.file;
     let bytes = fs::read(path).map_err(|error| usage(error.to_string()))?;
     let mut images = images(&bytes).map_err(|why| usage(format!("{}: {why:#}", path.display())))?;
-    images
-        .iter_mut()
-        .for_each(|image| sign(image, &key, *epoch));
+    let tree = workspace.sources()?.epoch;
+    for image in &mut images {
+        let own = u16::from_le_bytes([image[6], image[7]]);
+        match epoch {
+            Some(epoch) => put_epoch(image, *epoch),
+            None if own == tree => {}
+            None => {
+                return Err(usage(format!(
+                    "the file has epoch {own}, and these sources have {tree}: --epoch {own} keeps it"
+                )));
+            }
+        }
+        sign(image, &key);
+    }
     let output = options.output.as_ref().unwrap_or(path);
     fs::write(output, file(&images))?;
     say!("{}", output.display());
@@ -117,15 +146,17 @@ pub fn image(workspace: &mut Workspace, options: &Options, slot: Slot) -> Result
     let How { key, epoch } = &options.signature;
     let key = keys::read(workspace, key.as_deref())?;
     let elf = build::program(workspace, board, Program::Slot(slot), None)?.elf;
-    let mut image = unsigned(board, slot, &image::read(&elf)?)?;
-    sign(&mut image, &key, *epoch);
+    let mut sources = workspace.sources()?;
+    sources.epoch = epoch.unwrap_or(sources.epoch);
+    let mut image = unsigned(board, slot, &image::read(&elf)?, &sources)?;
+    sign(&mut image, &key);
     let file = elf.with_extension("image");
     fs::write(&file, image)?;
     Ok(file)
 }
 
 /// Returns the image for a slot, not signed yet: the header, and the application in an ELF file.
-pub fn unsigned(board: &Board, slot: Slot, elf: &[u8]) -> Result<Vec<u8>> {
+pub fn unsigned(board: &Board, slot: Slot, elf: &[u8], sources: &Sources) -> Result<Vec<u8>> {
     let layout = board.layout();
     let address = layout.slots[slot as usize];
     let mut flash = image::flat(elf, board.memory().part.flash)?;
@@ -148,44 +179,59 @@ pub fn unsigned(board: &Board, slot: Slot, elf: &[u8]) -> Result<Vec<u8>> {
     );
     let mut header = vec![0; HEADER as usize];
     let mut put = |at: usize, bytes: &[u8]| header[at..at + bytes.len()].copy_from_slice(bytes);
-    let version: Version = env!("CARGO_PKG_VERSION").parse()?;
+    let version = &sources.version;
     put(0, b"MODI");
     put(4, &[2, board.code as u8]);
     put(8, &[version.major as u8, version.minor as u8]);
     put(10, &(version.patch as u16).to_le_bytes());
     put(12, &address.to_le_bytes());
     put(16, &(application.len() as u32).to_le_bytes());
-    put(24, &first_32_bits(register_map::commit!()).to_le_bytes());
+    put(24, &first_32_bits(&sources.commit).to_le_bytes());
     put(28, &Sha512::digest(&application));
     header.extend(application);
+    put_epoch(&mut header, sources.epoch);
     Ok(header)
 }
 
 /// Gives an image a security epoch, and the CRC-32 that belongs to it.
-fn put_epoch(image: &mut [u8], epoch: [u8; 2]) {
-    image[6..8].copy_from_slice(&epoch);
+fn put_epoch(image: &mut [u8], epoch: u16) {
+    image[6..8].copy_from_slice(&epoch.to_le_bytes());
     let crc = crc32([&image[..20], &image[HEADER as usize..]]);
     image[20..24].copy_from_slice(&crc.to_le_bytes());
 }
 
-/// Gives an image the epoch and the signature of the same image in the file of an update.
-pub fn sign_as(image: &mut [u8], signed: &[u8], public: &[VerifyingKey]) -> Result<()> {
-    put_epoch(image, [signed[6], signed[7]]);
-    image[92..160].copy_from_slice(&signed[92..160]);
-    let signature = Signature::from_slice(&image[92..156]);
-    let signature = signature.map_err(|_| anyhow!("not a signature"))?;
-    let is_right = |key: &VerifyingKey| key.verify_strict(&image[..92], &signature).is_ok();
-    ensure!(
-        public.iter().any(is_right),
-        "the signed image is not the one that was built"
-    );
-    Ok(())
+/// Returns the bytes of an image that are signed: the header up to the signature.
+pub fn signed_part(image: &[u8]) -> &[u8] {
+    &image[..92]
 }
 
-/// Gives an image its security epoch, its CRC-32 and its signature.
-pub fn sign(image: &mut [u8], key: &SigningKey, epoch: u16) {
-    put_epoch(image, epoch.to_le_bytes());
-    let signature = key.sign(&image[..92]).to_bytes();
+/// Gives an image the epoch and the signature of the same image in the file of an update.
+pub fn sign_as(image: &mut [u8], signed: &[u8], public: &[VerifyingKey]) -> Result<()> {
+    put_epoch(image, u16::from_le_bytes([signed[6], signed[7]]));
+    put_signature(image, &signed[92..156], public).map(drop)
+}
+
+/// Gives an image a signature, and the number of the key that made it, which must be one of these.
+/// Returns the key.
+pub fn put_signature<'a>(
+    image: &mut [u8],
+    signature: &[u8],
+    public: &'a [VerifyingKey],
+) -> Result<&'a VerifyingKey> {
+    let parsed = Signature::from_slice(signature);
+    let parsed = parsed.map_err(|_| anyhow!("a signature has 64 bytes"))?;
+    let made_it = |key: &&VerifyingKey| key.verify_strict(signed_part(image), &parsed).is_ok();
+    let key = public.iter().find(made_it);
+    let key = key.context("the signature is not of this image by one of the public keys")?;
+    let number = keys::first_bytes(key.as_bytes());
+    image[92..156].copy_from_slice(signature);
+    image[156..160].copy_from_slice(&number);
+    Ok(key)
+}
+
+/// Gives an image its signature.
+pub fn sign(image: &mut [u8], key: &SigningKey) {
+    let signature = key.sign(signed_part(image)).to_bytes();
     image[92..156].copy_from_slice(&signature);
     let name = keys::first_bytes(key.verifying_key().as_bytes());
     image[156..160].copy_from_slice(&name);
@@ -232,8 +278,13 @@ mod tests {
     use crate::image::sample::{code, elf};
 
     fn of_slot(slot: Slot, elf: &[u8], key: &SigningKey, epoch: u16) -> Result<Vec<u8>> {
-        let mut image = unsigned(&MODIO_02, slot, elf)?;
-        sign(&mut image, key, epoch);
+        let sources = Sources {
+            version: "1.2.3-dev".parse()?,
+            commit: "1a2b3c4d".to_owned(),
+            epoch,
+        };
+        let mut image = unsigned(&MODIO_02, slot, elf, &sources)?;
+        sign(&mut image, key);
         Ok(image)
     }
 
@@ -298,8 +349,9 @@ mod tests {
             file: path.clone(),
             signature: How {
                 key: Some(key),
-                epoch: 4,
+                epoch: Some(4),
             },
+            end_first_key: false,
             output: None,
         };
         let workspace = Workspace::open().unwrap();

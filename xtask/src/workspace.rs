@@ -9,6 +9,7 @@ use anyhow::{Context as _, Result};
 use cargo_metadata::{Artifact, Message, MetadataCommand, PackageId};
 
 use crate::command;
+use crate::sources::Sources;
 use crate::toolchain::{self, Machine, Way};
 
 /// The project on this machine.
@@ -30,11 +31,25 @@ pub struct Workspace {
     pub keys: Option<PathBuf>,
 }
 
+/// Returns the directory of the root Cargo.toml: of the checkout in which cargo runs xtask, which may be a copy of the
+/// one that it was built from.
+fn root() -> Result<PathBuf> {
+    // Cargo sets the variable when it runs a program.
+    if let Some(package) = env::var_os("CARGO_MANIFEST_DIR") {
+        let package = PathBuf::from(package);
+        return Ok(package.parent().unwrap_or(&package).to_owned());
+    }
+    let mut cargo = Command::new(toolchain::cargo());
+    cargo.args(["locate-project", "--workspace", "--message-format=plain"]);
+    let manifest = PathBuf::from(command::read(&mut cargo)?.trim_end());
+    let directory = manifest.parent().context("Cargo.toml has no directory")?;
+    Ok(directory.to_owned())
+}
+
 impl Workspace {
-    /// Finds the project that xtask was built from, and cargo's target directory.
+    /// Finds the project in which xtask was called, and cargo's target directory.
     pub fn open() -> Result<Self> {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-        let root = root.parent().unwrap_or(root).to_owned();
+        let root = root()?;
         let offline = ["--offline".to_owned()];
         let mut metadata = MetadataCommand::new();
         metadata.current_dir(&root).no_deps().other_options(offline);
@@ -45,6 +60,11 @@ impl Workspace {
             keys: env::var_os("MODIO_KEYS").map(path::absolute).transpose()?,
             ..Self::default()
         })
+    }
+
+    /// Returns what the sources are now.
+    pub fn sources(&self) -> Result<Sources> {
+        Sources::of(&self.root)
     }
 
     /// Returns the same project with another target directory, and with further arguments of every cargo.

@@ -405,12 +405,18 @@ pub struct Update {
     /// Start the firmware that the units ran before, and keep it
     #[arg(long, conflicts_with_all = ["file", "status"])]
     pub back: bool,
+    /// Show what is in the file, without a unit
+    #[arg(long, conflicts_with_all = ["status", "back", "units", "unicast", "force", "end_first_key", "poll"])]
+    pub show: bool,
     /// Send the blocks to each unit alone
     #[arg(long, conflicts_with_all = ["status", "back"])]
     pub unicast: bool,
     /// Send the firmware to units that already run it as well
     #[arg(long, conflicts_with_all = ["status", "back"])]
     pub force: bool,
+    /// Let firmware that is signed with the second key of the units end their first key, for good
+    #[arg(long, conflicts_with_all = ["status", "back"])]
+    pub end_first_key: bool,
     /// Print these points of the endpoint's unit every second between the blocks, such as p5.1,p5.2
     #[arg(
         long,

@@ -79,6 +79,7 @@ async fn dispatch(mut cli: Cli, note: &Note) -> Result<(), Failure> {
     // These commands need no unit.
     match cli.command {
         Command::Ports => return ports::run(json),
+        Command::Update(options) if options.show => return update::show(&options, json),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "modioctl", &mut script);

@@ -4,10 +4,12 @@ use std::fmt;
 use std::path::Path;
 
 use register_map::Board;
+use register_map::layout::HEADER;
 use register_map::update::{BLOCK_BYTES, Header, Manifest, Slot, crc32, intact};
 use sha2::{Digest as _, Sha512};
 
 use crate::failure::Failure;
+use crate::value::long;
 
 /// The largest file that is read. Two slots of the largest part have less than a quarter of it.
 const MOST: u64 = 1 << 20;
@@ -19,6 +21,10 @@ pub struct Image {
     pub slot: Slot,
     /// What file 2 reports of this image: version, patch level, epoch, commit (2), blocks, key (2).
     pub words: [u16; 8],
+    /// Bytes of the header and the application.
+    pub bytes: u32,
+    /// Its CRC-32.
+    pub crc: u32,
     /// Its blocks, the last one filled with FF.
     pub blocks: Vec<[u8; BLOCK_BYTES]>,
 }
@@ -54,6 +60,18 @@ impl Image {
     pub const fn epoch(&self) -> u16 {
         self.words[2]
     }
+
+    /// Returns the number of the key that signed it; 0 if it is not signed.
+    #[must_use]
+    pub fn key(&self) -> u32 {
+        key_of(&self.words)
+    }
+}
+
+/// Returns the number of the key that signed an image, from the words that file 2 reports of it.
+#[must_use]
+pub fn key_of(words: &[u16; 8]) -> u32 {
+    long(&words[6..])
 }
 
 impl File {
@@ -94,8 +112,17 @@ impl File {
         if board != other || a.words[..5] != b.words[..5] {
             return Err("the two images are not of one board and one version".to_owned());
         }
+        if a.key() != b.key() {
+            return Err("the two images are signed with different keys".to_owned());
+        }
         let images = [a, b];
         Ok(Self { board, images })
+    }
+
+    /// Returns the number of the key that signed both images; 0 if they are not signed.
+    #[must_use]
+    pub fn key(&self) -> u32 {
+        self.images[0].key()
     }
 
     /// Returns the image for a slot.
@@ -137,11 +164,14 @@ fn image(bytes: &[u8], slot: Slot) -> Result<(&'static Board, Image), String> {
     });
     let blocks: Vec<_> = blocks.collect();
     let [words @ .., _, _] = header.words();
+    let (bytes, crc) = (HEADER + header.length(), header.crc());
     Ok((
         board,
         Image {
             slot,
             words,
+            bytes,
+            crc,
             blocks,
         },
     ))
@@ -149,13 +179,19 @@ fn image(bytes: &[u8], slot: Slot) -> Result<(&'static Board, Image), String> {
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use super::super::tests::sample::{file, image, sealed};
+    use super::super::tests::sample::{file, image, sealed, signed};
     use super::*;
 
     /// Returns the file of a modio-02 whose images have this number of blocks.
     pub fn of_blocks(blocks: usize) -> File {
+        signed_of_blocks(blocks, 0)
+    }
+
+    /// The same, signed with the key with this number.
+    pub fn signed_of_blocks(blocks: usize, key: u32) -> File {
         let length = blocks * BLOCK_BYTES - 512;
-        File::of(&file(Slot::ALL.map(|slot| image(slot, length)))).unwrap()
+        let images = Slot::ALL.map(|slot| signed(image(slot, length), key));
+        File::of(&file(images)).unwrap()
     }
 
     #[test]
@@ -170,6 +206,9 @@ pub(crate) mod tests {
         assert_eq!(first.blocks.as_flattened()[1516..], [0xFF; 20]);
         assert_eq!(first.words, [3, 1, 0, 0x1A2B, 0x3C4D, 12, 0, 0]);
         assert_eq!(Version(&first.words).to_string(), "0.3.1 (1a2b3c4d)");
+        let crc = u32::from_le_bytes(*a[20..].first_chunk().unwrap());
+        assert_eq!((first.bytes, first.crc, first.key()), (1516, crc, 0));
+        assert_eq!(signed_of_blocks(20, 0x0102_FFFE).key(), 0x0102_FFFE);
     }
 
     #[test]
@@ -193,6 +232,7 @@ pub(crate) mod tests {
         };
         assert!(changed(5, 9).contains("is for board 9, which"));
         assert!(changed(8, 1).contains("not of one board and one version"));
+        assert!(changed(159, 1).contains("signed with different keys"));
         let mut unsealed = b.clone();
         unsealed[600] ^= 1;
         assert!(refused(&file([a.clone(), unsealed])).contains("CRC-32"));

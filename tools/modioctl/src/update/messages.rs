@@ -5,6 +5,9 @@ use register_map::configuration::{COMMAND, KEY, OPENING_KEY};
 use register_map::state::{COMMIT, FIRMWARE_VERSION, UPDATE, update};
 use register_map::update::{BLOCK, BLOCK_BYTES, Slot, State, place_of, status};
 
+use super::Image;
+use crate::value::long;
+
 /// Records of file 2 that a poll during the transfer reads.
 const SHORT: u16 = status::SLOT + 1;
 /// Records of file 2 with both images.
@@ -31,6 +34,12 @@ pub struct Status {
     pub pages: u16,
     /// The running image and the one in the other slot.
     pub images: [[u16; 8]; 2],
+    /// CRC-32 of both images; 0 if there is none, or if the unit does not report it.
+    pub crcs: [u32; 2],
+    /// Numbers of the loader's first and second key; 0 if the unit does not report them.
+    pub keys: [u32; 2],
+    /// The first key is revoked.
+    pub revoked: bool,
 }
 
 impl Status {
@@ -42,6 +51,8 @@ impl Status {
         let reason = word(status::REASON)?;
         let rest = |record: u16| word(record).unwrap_or_default();
         let image = |first: u16| std::array::from_fn(|n| rest(first + n as u16));
+        let longs =
+            |first: u16| [first, first + 2].map(|record| long(&[rest(record), rest(record + 1)]));
         // A reason may also be why a block was refused, while blocks are received.
         let detail = if matches!(code, 4 | 6) { reason } else { 0 };
         let byte = |word: u16| u8::try_from(word).ok();
@@ -60,7 +71,27 @@ impl Status {
             floor: rest(status::FLOOR),
             pages: rest(status::PAGES),
             images: [status::RUNNING.start, status::OTHER.start].map(image),
+            crcs: longs(status::CRCS.start),
+            keys: longs(status::KEYS.start),
+            revoked: rest(status::REVOKED) & 1 == 1,
         })
+    }
+
+    /// Returns whether the unit, whose board is that of the image, runs this image, perhaps signed with another key.
+    #[must_use]
+    pub fn runs(&self, image: &Image) -> bool {
+        let ([words, _], [crc, _]) = (&self.images, self.crcs);
+        match crc {
+            0 => *words == image.words,
+            crc => (words[2], crc) == (image.epoch(), image.crc),
+        }
+    }
+
+    /// Returns whether the other slot has the header of exactly this image.
+    #[must_use]
+    pub fn has(&self, image: &Image) -> bool {
+        let ([_, words], [_, crc]) = (&self.images, self.crcs);
+        *words == image.words && [0, image.crc].contains(&crc)
     }
 }
 

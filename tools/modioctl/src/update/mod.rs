@@ -7,6 +7,7 @@
 mod campaign;
 mod fault;
 pub mod file;
+mod keys;
 mod messages;
 mod unit;
 
@@ -16,5 +17,6 @@ mod tests;
 pub use campaign::{Campaign, Patience, Step};
 pub use fault::{Fault, reason_text, state_text};
 pub use file::{File, Image};
+pub use keys::key_name;
 pub use messages::{Status, read_status};
 pub use unit::{Stage, Unit};

@@ -1,17 +1,17 @@
 //! `update`, with units that the test serves, and with the loader and the image in the simulator.
 
 use std::net::SocketAddr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use modioctl::bus::adu::Framing;
 use modioctl::update::File;
 use register_map::Module;
-use register_map::state::{FIRMWARE_VERSION, UPDATE};
-use register_map::update::{Slot, State};
+use register_map::state::{BUILD, FIRMWARE_VERSION, UPDATE};
+use register_map::update::{DEVELOPMENT_KEY, Slot, State};
 
-use crate::program::{At, has};
+use crate::program::{At, Ran, has, modioctl};
 use crate::served::{modio_02, response, serve_requests, server};
 use crate::unit::{Unit, update_file};
 
@@ -64,15 +64,18 @@ impl Line {
 
     /// Returns the path of a file for a modio-02.
     fn file(&self) -> PathBuf {
-        let path = self.folder.path().join("modio-02.modio");
-        let images = Slot::ALL.map(|slot| sample::image(slot, BLOCKS * 128 - 512));
-        std::fs::write(&path, sample::file(images)).unwrap();
-        path
+        file(self.folder.path(), 0)
     }
 
     fn words(&self, words: &str) -> String {
         let file = self.file();
         format!("--baud 921600 --timeout 200ms {words}").replace("FILE", file.to_str().unwrap())
+    }
+
+    /// The same with a file that is signed with this key.
+    fn run_by(&self, key: u32, words: &str) -> crate::program::Ran {
+        let file = file(self.folder.path(), key);
+        self.run(&words.replace("FILE", file.to_str().unwrap()))
     }
 
     fn run(&self, words: &str) -> crate::program::Ran {
@@ -83,6 +86,15 @@ impl Line {
         let written = self.written.lock().unwrap();
         written.iter().filter(|pdu| pdu.len() > 100).count()
     }
+}
+
+/// Writes the file of an update of a modio-02 by the key with this number, 0 for none. Returns its path.
+fn file(folder: &Path, key: u32) -> PathBuf {
+    let path = folder.join(format!("modio-02-{key}.modio"));
+    let images = Slot::ALL.map(|slot| sample::image(slot, BLOCKS * 128 - 512));
+    let images = images.map(|image| sample::signed(image, key));
+    std::fs::write(&path, sample::file(images)).unwrap();
+    path
 }
 
 fn serve(
@@ -100,7 +112,7 @@ fn serve(
         let mut units = units.lock().unwrap();
         let first = u16::from_be_bytes([pdu[1], pdu[2]]);
         let is_points =
-            pdu[0] == 1 || (pdu[0] == 3 && ![FIRMWARE_VERSION, UPDATE].contains(&first));
+            pdu[0] == 1 || (pdu[0] == 3 && ![FIRMWARE_VERSION, BUILD, UPDATE].contains(&first));
         let mut bytes = match echo {
             true => Framing::Rtu.frame(0, unit, pdu),
             false => Vec::new(),
@@ -181,6 +193,192 @@ fn nothing_is_sent_unless_the_file_suits_every_unit() {
     line.run("update").failed(2);
     line.run("update --status FILE").failed(2);
     assert_eq!(line.written.lock().unwrap().len(), 0);
+}
+
+/// Numbers of the keys of a loader.
+const KEYS: [u32; 2] = [0x0101_FFFF, 0x0202_EEEE];
+
+#[test]
+fn a_file_by_the_second_key_ends_the_first_only_when_that_is_asked_for() {
+    let [first, second] = KEYS;
+    let line = Line::new(3, |unit| {
+        // Unit 3 has ended its first key before.
+        (unit.keys, unit.revoked) = (KEYS, unit.address == 3);
+    });
+    let text = line.run_by(second, "update FILE --units 1-3").failed(2);
+    let asks = "nothing was sent: the file is signed with the second key of units 1-2, so it ends the first key there";
+    has(&text, &[asks, ": give --end-first-key"]);
+    let text = line
+        .run_by(first, "update FILE --units 1-2 --end-first-key")
+        .failed(2);
+    has(
+        &text,
+        &["unit 1 keeps its first key, 0101ffff: ", "; unit 2 keeps"],
+    );
+    let text = line.run_by(first, "update FILE --units 1-3").failed(2);
+    has(
+        &text,
+        &["nothing was sent: unit 3 takes no file by its first key"],
+    );
+    let text = line.run_by(3, "update FILE").failed(2);
+    has(
+        &text,
+        &["unit 1 takes only files by the keys 0101ffff and 0202eeee"],
+    );
+    assert_eq!(line.written.lock().unwrap().len(), 0);
+
+    // Also when the unit runs that file already.
+    let runs = Line::new(1, |unit| unit.keys = KEYS);
+    let image = File::read(&file(runs.folder.path(), first)).unwrap().images[0].clone();
+    runs.units.lock().unwrap()[0].images[0] = image.words;
+    has(
+        &runs.run_by(first, "update FILE").fine(),
+        &["it runs that already"],
+    );
+    let text = runs.run_by(first, "update FILE --end-first-key").failed(2);
+    has(&text, &["unit 1 keeps its first key, 0101ffff: "]);
+
+    let ran = line.run_by(second, "update FILE --units 1-3 --end-first-key");
+    has(
+        &ran.err,
+        &["ends the first key of units 1-2, for good: neither SW01 = 254 nor 0xB004"],
+    );
+    let done = "0.1.2 (00030004) -> 0.3.1 (1a2b3c4d) in slot B, confirmed";
+    has(&ran.fine(), &[&format!("unit 1: {done}")]);
+    assert!(line.units.lock().unwrap().iter().all(|unit| unit.revoked));
+}
+
+#[test]
+fn no_order_is_given_to_go_back_to_an_image_by_a_revoked_key() {
+    let line = Line::new(1, |unit| {
+        (unit.keys, unit.state) = (KEYS, State::Confirmed);
+        unit.images[1] = [0x0100, 7, 0, 0xAAAA, 0xBBBB, 20, 0x0101, 0xFFFF];
+        unit.images[0][6..].copy_from_slice(&[0x0202, 0xEEEE]);
+        unit.revoked = true;
+    });
+    let text = line.run("update --back").failed(2);
+    let why = "unit 1 cannot go back: 1.0.7 (aaaabbbb) is signed with the first key of the unit, which is revoked";
+    has(&text, &[why]);
+    assert_eq!(line.written.lock().unwrap().len(), 0);
+}
+
+#[test]
+fn a_unit_that_runs_another_image_of_the_same_commit_is_updated() {
+    let line = Line::new(2, |unit| unit.crcs[0] = u32::from(unit.address));
+    let image = File::read(&line.file()).unwrap().images[0].clone();
+    line.units.lock().unwrap().iter_mut().for_each(|unit| {
+        unit.images[0] = image.words;
+        unit.crcs[0] = image.crc ^ u32::from(unit.address == 2);
+    });
+    let text = line.run("update FILE --units 1-2").fine();
+    has(
+        &text,
+        &["unit 1: 0.3.1 (1a2b3c4d) in slot A, it runs that already"],
+    );
+    has(
+        &text,
+        &["unit 2: 0.3.1 (1a2b3c4d) -> 0.3.1 (1a2b3c4d) in slot B, confirmed"],
+    );
+}
+
+#[test]
+fn older_firmware_reports_neither_crc_nor_keys_and_is_updated() {
+    let line = Line::new(1, |unit| unit.older = true);
+    let text = line.run("update FILE").fine();
+    has(
+        &text,
+        &["unit 1: 0.1.2 (00030004) -> 0.3.1 (1a2b3c4d) in slot B, confirmed"],
+    );
+    let text = line.run("update FILE").fine();
+    has(&text, &["it runs that already"]);
+}
+
+#[test]
+fn units_that_accept_a_development_key_are_named_in_one_line() {
+    let line = Line::new(4, |unit| unit.development = unit.address != 3);
+    let names = |ran: &Ran, units: &str| {
+        let line =
+            format!("modioctl: a development key, which everybody has, is accepted by {units}: ");
+        assert!(ran.err.starts_with(&line), "{ran:?}");
+        assert_eq!(ran.err.lines().count(), 1, "{ran:?}");
+    };
+    names(&line.run("update --status --units 1-4"), "units 1-2, 4");
+    names(&line.run("update FILE --units 1,3"), "unit 1");
+    let ran = line.run("update --status --units 3");
+    assert_eq!(ran.err, "", "no development key");
+    let json: serde_json::Value =
+        serde_json::from_str(&line.run("--json update --status --units 3-4").fine()).unwrap();
+    assert_eq!(
+        [0, 1].map(|unit: usize| &json[unit]["development"]),
+        [&false, &true]
+    );
+}
+
+#[test]
+fn info_names_a_development_key_that_the_loader_accepts() {
+    for (build, accepts) in [(0b1010, true), (0b0010, false)] {
+        let registers = modio_02(Module::Di4).into_iter();
+        let mut server = server(registers.chain([(BUILD, build)]));
+        let address = serve_requests(move |unit, pdu| Some(response(&mut server, unit, pdu)));
+        let text = At::tcp(address).run("info").fine();
+        let row = text.lines().find(|line| line.starts_with("  build "));
+        let row = row.unwrap();
+        let says = row.contains("the loader accepts the development key");
+        assert_eq!(says, accepts, "{row}");
+    }
+}
+
+#[test]
+fn what_is_in_a_file_is_shown_without_a_unit() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |key, options: &str| {
+        let file = file(folder.path(), key);
+        let mut command = modioctl(&[]);
+        command.args(options.split_whitespace());
+        Ran::of(
+            &command
+                .args(["update", "--show"])
+                .arg(file)
+                .output()
+                .unwrap(),
+        )
+    };
+    let images = File::read(&file(folder.path(), 0)).unwrap().images;
+    let [a, b] = images.map(|image| image.crc);
+    let text = run(DEVELOPMENT_KEY, "").fine();
+    let rows: Vec<_> = text.lines().map(str::trim_end).collect();
+    assert_eq!(
+        rows,
+        [
+            "board    modio-02",
+            "version  0.3.1",
+            "commit   1a2b3c4d",
+            "epoch    0",
+            "key      11fa5ab8, a development key, which everybody has",
+            &format!("slot A   12800 bytes, CRC-32 {a:08x}"),
+            &format!("slot B   12800 bytes, CRC-32 {b:08x}"),
+        ]
+    );
+    has(
+        &run(1, "").fine(),
+        &["key      00000001, which this program does not know"],
+    );
+    has(&run(0, "").fine(), &["key      none: it is not signed"]);
+    let json: serde_json::Value = serde_json::from_str(&run(0x0A, "--json").fine()).unwrap();
+    assert_eq!(
+        (&json["key"], &json["key_name"]),
+        (&"0000000a".into(), &().into())
+    );
+    assert_eq!(json["images"][1]["bytes"], 12800);
+    let line = Line::new(0, |_| ());
+    for wrong in [
+        "--show",
+        "--show FILE --status",
+        "--show FILE --units 1",
+        "--show FILE --end-first-key",
+    ] {
+        line.run(&format!("update {wrong}")).failed(2);
+    }
 }
 
 #[test]

@@ -4,12 +4,12 @@ use std::time::{Duration, Instant};
 
 use modbus_line::adu;
 use register_map::Board;
-use register_map::state::{PRODUCT, PRODUCT_CODE, UPDATE, update};
-use register_map::update::{Reason, Slot, State, status};
+use register_map::state::{BUILD, PRODUCT, PRODUCT_CODE, UPDATE, build, update};
+use register_map::update::{Reason, State, status};
 
 use crate::device::Device;
 use crate::failure::Failure;
-use crate::update::file::Version;
+use crate::update::file::{Version, key_of};
 use crate::update::{File, Stage, Status, Unit, reason_text, state_text};
 use crate::value::long;
 
@@ -24,6 +24,8 @@ pub struct Found {
     pub status: Status,
     /// The running image is on trial.
     pub trial: bool,
+    /// The loader accepts a development key.
+    pub development: bool,
     /// Time of the longest answer.
     pub time: Duration,
 }
@@ -51,10 +53,16 @@ async fn ask(device: &mut Device) -> Result<Found, Failure> {
         return Err(wrong("is not a modio"));
     }
     let asked = Instant::now();
-    let file = match device
-        .read_records(status::FILE, 0, status::OTHER.end)
-        .await
-    {
+    let mut file = device
+        .read_records(status::FILE, 0, status::REVOKED + 1)
+        .await;
+    if matches!(file, Err(Failure::Refused(_))) {
+        // Older firmware has neither the CRC-32s nor the keys.
+        file = device
+            .read_records(status::FILE, 0, status::OTHER.end)
+            .await;
+    }
+    let file = match file {
         Ok(file) => file,
         Err(Failure::Refused(_)) => {
             return Err(wrong(
@@ -67,12 +75,15 @@ async fn ask(device: &mut Device) -> Result<Found, Failure> {
     let status = Status::of(&adu::words(&file)).ok_or_else(|| {
         wrong("reports an update that this program does not understand: a newer modioctl may be needed")
     })?;
-    let register = device.read_words(UPDATE, 1).await?;
+    let has = |words: Vec<u16>, bit| words.iter().any(|word| word & bit != 0);
+    let trial = has(device.read_words(UPDATE, 1).await?, update::TRIAL);
+    let built = device.read_words(BUILD, 1).await?;
     Ok(Found {
         address: device.unit,
         board: Board::from_code(board),
         status,
-        trial: register.iter().any(|word| word & update::TRIAL != 0),
+        trial,
+        development: has(built, build::DEVELOPMENT_TRUSTED),
         time,
     })
 }
@@ -113,7 +124,7 @@ impl Found {
         let Status {
             slot,
             state,
-            images: [runs, other],
+            images: [runs, _],
             ..
         } = &self.status;
         if self.board != Some(file.board) {
@@ -123,14 +134,17 @@ impl Found {
                 file.board
             ));
         }
-        let running = file.image(*slot).words;
-        let unit = |slot: Slot, stage| Unit::new(self.address, slot, file.image(slot).words, stage);
-        if *runs == running && self.trial {
+        // The words of the unit, because the commit of the same image may be another one.
+        let unit = |stage| Ok(Unit::new(self.address, *slot, *runs, stage));
+        let is_running = self.status.runs(file.image(*slot));
+        let is_by_its_key = file.key() == key_of(runs);
+        if is_running && is_by_its_key && self.trial {
             // An update was interrupted after the restart.
-            return Ok(unit(*slot, Stage::OnTrial));
+            return unit(Stage::OnTrial);
         }
-        if *runs == running && !force {
-            return Ok(unit(*slot, Stage::Done));
+        let is_needed = force || (self.is_by_second_key(file) && !is_by_its_key);
+        if is_running && !self.trial && !is_needed {
+            return unit(Stage::Done);
         }
         if self.trial {
             return Err(format!(
@@ -149,12 +163,46 @@ impl Found {
         }
         let stage = match state {
             Some(State::New | State::Checking) => Stage::Restarting,
-            Some(State::Receiving) if self.status.pages == 0 && *other == image.words => {
+            Some(State::Receiving) if self.status.pages == 0 && self.status.has(image) => {
                 Stage::Receiving
             }
             _ => Stage::Waiting,
         };
-        Ok(unit(target, stage))
+        Ok(Unit::new(self.address, target, image.words, stage))
+    }
+
+    /// Returns whether a file is signed with the second key of the unit, whose first key is not revoked yet.
+    fn is_by_second_key(&self, file: &File) -> bool {
+        let Status { keys, revoked, .. } = self.status;
+        let [first, second] = keys;
+        file.key() == second && second != first && !revoked
+    }
+
+    /// Returns whether the update with a file ends the first key of the unit, or why its loader would reject the file, or
+    /// why the file does not end that key as `wanted`.
+    pub fn ends_first_key(&self, file: &File, wanted: bool) -> Result<bool, String> {
+        let Status { keys, revoked, .. } = self.status;
+        let [first, second] = keys;
+        let key = file.key();
+        if keys == [0; 2] && wanted {
+            Err("does not report the keys of its loader: update it with a file by its first key, then repeat this".to_owned())
+        } else if keys == [0; 2] {
+            Ok(false)
+        } else if key == first && revoked {
+            Err(format!(
+                "takes no file by its first key, which is revoked: one that is signed with its second key, {second:08x}, is needed"
+            ))
+        } else if key == first && wanted {
+            Err(format!(
+                "keeps its first key, {first:08x}: the file is signed with that key, and only one by the second key, {second:08x}, ends it"
+            ))
+        } else if key == first || key == second {
+            Ok(self.is_by_second_key(file))
+        } else {
+            Err(format!(
+                "takes only files by the keys {first:08x} and {second:08x}, and the file is signed with {key:08x}"
+            ))
+        }
     }
 
     /// Returns the unit for the way back, or why there is none.
@@ -164,6 +212,8 @@ impl Found {
             state,
             images: [_, other],
             floor,
+            keys: [first, _],
+            revoked,
             ..
         } = &self.status;
         if self.trial {
@@ -175,6 +225,10 @@ impl Found {
         match state {
             Some(State::Confirmed) if other[2] < *floor => Err(format!(
                 "cannot go back: {} is below security epoch {floor}",
+                Version(other)
+            )),
+            Some(State::Confirmed) if *revoked && key_of(other) == *first => Err(format!(
+                "cannot go back: {} is signed with the first key of the unit, which is revoked",
                 Version(other)
             )),
             Some(State::Confirmed) => Ok(Unit::back(self.address, slot.other(), *other)),
@@ -193,9 +247,13 @@ impl Found {
 #[cfg(test)]
 mod tests {
     use register_map::board::{MODIO_02, MODIO_08};
+    use register_map::update::Slot;
 
     use super::*;
-    use crate::update::file::tests::of_blocks;
+    use crate::update::file::tests::{of_blocks, signed_of_blocks};
+
+    /// Numbers of the loader's keys.
+    const KEYS: [u32; 2] = [0x0101_FFFF, 0x0202_EEEE];
 
     /// Returns a unit that runs another version from slot A.
     fn found() -> Found {
@@ -206,6 +264,7 @@ mod tests {
             board: Some(&MODIO_02),
             status: Status::of(&words).unwrap(),
             trial: false,
+            development: false,
             time: Duration::ZERO,
         }
     }
@@ -256,6 +315,112 @@ mod tests {
         unit = found();
         unit.trial = true;
         assert!(refused(&unit).contains("runs 0.2.0 (00000000) on trial"));
+    }
+
+    /// Returns a unit with these keys in its loader, which may run the image of this file from slot A.
+    fn with_keys(running: Option<&File>) -> Found {
+        let mut unit = found();
+        unit.status.keys = KEYS;
+        if let Some(file) = running {
+            let image = file.image(Slot::A);
+            (unit.status.images[0], unit.status.crcs[0]) = (image.words, image.crc);
+        }
+        unit
+    }
+
+    #[test]
+    fn two_images_are_the_same_by_epoch_and_crc_where_the_unit_reports_it() {
+        let file = of_blocks(20);
+        let stage = |unit: &Found| unit.unit(&file, false).unwrap().stage;
+        let mut unit = with_keys(Some(&file));
+        assert_eq!(stage(&unit), Stage::Done);
+        // The same image of another commit.
+        unit.status.images[0][3] += 1;
+        assert_eq!(stage(&unit), Stage::Done);
+        unit.status.crcs[0] = 0;
+        assert_eq!(stage(&unit), Stage::Waiting, "the words, without a CRC-32");
+        // Another image of the same commit.
+        unit = with_keys(Some(&file));
+        unit.status.crcs[0] ^= 1;
+        assert_eq!(stage(&unit), Stage::Waiting);
+        unit.trial = true;
+        assert!(unit.unit(&file, false).unwrap_err().contains("on trial"));
+        unit = with_keys(Some(&file));
+        unit.status.images[0][2] += 1;
+        assert_eq!(stage(&unit), Stage::Waiting, "another epoch");
+        // Blocks of another image of the same commit.
+        unit = found();
+        unit.status.state = Some(State::Receiving);
+        unit.status.images[1] = file.image(Slot::B).words;
+        unit.status.crcs[1] = file.image(Slot::B).crc;
+        assert_eq!(stage(&unit), Stage::Receiving);
+        unit.status.crcs[1] ^= 1;
+        assert_eq!(stage(&unit), Stage::Waiting);
+    }
+
+    #[test]
+    fn the_image_that_a_unit_runs_is_sent_again_by_the_second_key_to_end_the_first() {
+        let [first, second] = KEYS.map(|key| signed_of_blocks(20, key));
+        let mut unit = with_keys(Some(&first));
+        let stage = |unit: &Found, file| unit.unit(file, false).unwrap().stage;
+        assert_eq!(stage(&unit, &first), Stage::Done);
+        assert_eq!(stage(&unit, &second), Stage::Waiting);
+        unit.trial = true;
+        assert_eq!(stage(&unit, &first), Stage::OnTrial);
+        assert!(unit.unit(&second, false).unwrap_err().contains("on trial"));
+        unit = with_keys(Some(&second));
+        unit.status.revoked = true;
+        assert_eq!(
+            [&first, &second].map(|file| stage(&unit, file)),
+            [Stage::Done; 2]
+        );
+    }
+
+    #[test]
+    fn the_first_key_is_ended_by_a_file_of_the_second_alone() {
+        let [first, second, third] = [KEYS[0], KEYS[1], 3].map(|key| signed_of_blocks(20, key));
+        let mut unit = with_keys(None);
+        assert_eq!(unit.ends_first_key(&first, false), Ok(false));
+        assert_eq!(unit.ends_first_key(&second, false), Ok(true));
+        assert_eq!(unit.ends_first_key(&second, true), Ok(true));
+        let refused = |unit: &Found, file, wanted| unit.ends_first_key(file, wanted).unwrap_err();
+        assert!(refused(&unit, &first, true).starts_with("keeps its first key, 0101ffff: "));
+        for wanted in [false, true] {
+            let text = refused(&unit, &third, wanted);
+            assert_eq!(
+                text,
+                "takes only files by the keys 0101ffff and 0202eeee, and the file is signed with 00000003"
+            );
+        }
+        unit.status.revoked = true;
+        assert_eq!(
+            unit.ends_first_key(&second, true),
+            Ok(false),
+            "it has ended"
+        );
+        for wanted in [false, true] {
+            let text = refused(&unit, &first, wanted);
+            assert!(text.starts_with("takes no file by its first key, which is revoked: "));
+        }
+        // A unit that does not report its keys.
+        unit = found();
+        assert_eq!(unit.ends_first_key(&second, false), Ok(false));
+        assert!(refused(&unit, &second, true).starts_with("does not report the keys"));
+    }
+
+    #[test]
+    fn no_way_leads_back_to_an_image_by_a_revoked_key() {
+        let mut unit = with_keys(None);
+        unit.status.state = Some(State::Confirmed);
+        unit.status.images[1][6..].copy_from_slice(&[0x0101, 0xFFFF]);
+        assert_eq!(unit.back().unwrap().target, Slot::B);
+        unit.status.revoked = true;
+        assert_eq!(
+            unit.back().unwrap_err(),
+            "cannot go back: 0.0.0 (00000000) is signed with the first key of the unit, which is revoked"
+        );
+        unit.status.images[1][6..].copy_from_slice(&[0x0202, 0xEEEE]);
+        assert_eq!(unit.back().unwrap().target, Slot::B);
     }
 
     #[test]

@@ -18,12 +18,18 @@ use crate::device::{Device, fetch};
 use crate::failure::Failure;
 use crate::update::{Campaign, Fault, File, Stage, Unit};
 use drive::{Drive, Poll};
-use found::look;
+use found::{Found, look};
 use progress::Progress;
-use report::{Transfer, report, show};
+use report::{Transfer, report, show_file, show_units};
 
 /// What is added to the time of the longest answer until a unit counts as silent for now.
 const MARGIN: Duration = Duration::from_millis(100);
+
+/// Shows what is in the file.
+pub fn show(options: &Update, json: bool) -> Result<(), Failure> {
+    let file = options.file.as_deref().map(File::read).transpose()?;
+    file.map_or(Ok(()), |file| show_file(&file, json))
+}
 
 /// Updates units, or shows what they run.
 pub async fn run(
@@ -47,13 +53,22 @@ pub async fn run(
         }
     }
     if options.status {
-        show(&found, json)?;
+        show_units(&found, json)?;
+        warn_of_development(&found);
         return report_all(failed);
     }
     let mut units = Vec::new();
+    let mut ended_keys = Vec::new();
     for unit in &found {
         let fits = match &file {
-            Some(file) => unit.unit(file, options.force),
+            Some(file) => unit.unit(file, options.force).and_then(|fits| {
+                let is_needed = fits.stage != Stage::Done;
+                if is_needed || options.end_first_key {
+                    let ends = unit.ends_first_key(file, options.end_first_key)?;
+                    ended_keys.extend((ends && is_needed).then_some(unit.address));
+                }
+                Ok(fits)
+            }),
             None => unit.back(),
         };
         match fits {
@@ -61,7 +76,19 @@ pub async fn run(
             Err(what) => failed.push(Failure::Usage(format!("unit {} {what}", unit.address))),
         }
     }
+    let names = named(&ended_keys);
+    if !ended_keys.is_empty() && !options.end_first_key {
+        failed.push(Failure::Usage(format!(
+            "the file is signed with the second key of {names}, so it ends the first key there, for good: give --end-first-key if that is what you want"
+        )));
+    }
     refuse(&failed)?;
+    warn_of_development(&found);
+    if !ended_keys.is_empty() {
+        eprintln!(
+            "modioctl: this update ends the first key of {names}, for good: neither SW01 = 254 nor 0xB004 (`--back`) leads back to an image by the first key"
+        );
+    }
     let poll = poll(&mut device, &options.poll, json).await?;
     let endpoint = device.master.endpoint();
     let longest = found.iter().map(|unit| unit.time).max();
@@ -143,6 +170,34 @@ fn report_all(mut failed: Vec<Failure>) -> Result<(), Failure> {
         eprintln!("modioctl: {failure}");
     }
     last.map_or(Ok(()), Err)
+}
+
+/// Reports in one line which units accept a development key.
+fn warn_of_development(found: &[Found]) {
+    let units = found.iter().filter(|unit| unit.development);
+    let units: Vec<_> = units.map(|unit| unit.address).collect();
+    if !units.is_empty() {
+        eprintln!(
+            "modioctl: a development key, which everybody has, is accepted by {}: anybody on the line can install any firmware there (docs/update.md, Keys)",
+            named(&units)
+        );
+    }
+}
+
+/// Names units for people: unit 4; units 1-3, 7.
+fn named(addresses: &[u8]) -> String {
+    let follow = |one: &u8, next: &u8| one + 1 == *next;
+    let ranges = addresses.chunk_by(follow).map(|range| match range {
+        [first, .., last] => format!("{first}-{last}"),
+        range => range.iter().map(u8::to_string).collect(),
+    });
+    let ranges: Vec<_> = ranges.collect();
+    let units = if addresses.len() == 1 {
+        "unit"
+    } else {
+        "units"
+    };
+    format!("{units} {}", ranges.join(", "))
 }
 
 /// Returns the poll of the points with these names.

@@ -9,7 +9,7 @@ use crate::bus::Endpoint;
 use crate::failure::Failure;
 use crate::output;
 use crate::update::file::Version;
-use crate::update::{Stage, Unit};
+use crate::update::{File, Image, Stage, Unit, key_name};
 
 /// The transfer of an image to the units with one slot.
 pub struct Transfer {
@@ -51,8 +51,59 @@ impl Transfer {
     }
 }
 
+/// Prints what is in a file.
+pub fn show_file(file: &File, json: bool) -> Result<(), Failure> {
+    let [image, _] = &file.images;
+    let [version, patch, epoch, high, low, ..] = image.words;
+    let [major, minor] = version.to_be_bytes();
+    let (board, version) = (file.board.name, format!("{major}.{minor}.{patch}"));
+    let commit = format!("{high:04x}{low:04x}");
+    let (key, name) = (image.key(), key_name(image.key()));
+    if json {
+        let images = file.images.iter().map(|image| {
+            let Image {
+                slot, bytes, crc, ..
+            } = image;
+            json!({"slot": format!("{slot:?}"), "bytes": bytes, "crc32": format!("{crc:08x}")})
+        });
+        return output::json(&json!({
+            "board": board,
+            "version": version,
+            "commit": commit,
+            "epoch": epoch,
+            "key": format!("{key:08x}"),
+            "key_name": name,
+            "images": images.collect::<Json>(),
+        }));
+    }
+    let key = match (key, name) {
+        (0, _) => "none: it is not signed".to_owned(),
+        (key, Some("development")) => format!("{key:08x}, a development key, which everybody has"),
+        (key, Some(name)) => format!("{key:08x}, the {name} key of releases"),
+        (key, None) => format!("{key:08x}, which this program does not know"),
+    };
+    let rows = [
+        ("board", board.to_owned()),
+        ("version", version),
+        ("commit", commit),
+        ("epoch", epoch.to_string()),
+        ("key", key),
+    ];
+    let rows = rows.map(|(name, text)| [name.to_owned(), text]);
+    let images = file.images.iter().map(|image| {
+        let Image {
+            slot, bytes, crc, ..
+        } = image;
+        [
+            format!("slot {slot:?}"),
+            format!("{bytes} bytes, CRC-32 {crc:08x}"),
+        ]
+    });
+    output::table(&rows.into_iter().chain(images).collect::<Vec<_>>())
+}
+
 /// Prints what the units run, and what their other slots hold.
-pub fn show(found: &[Found], json: bool) -> Result<(), Failure> {
+pub fn show_units(found: &[Found], json: bool) -> Result<(), Failure> {
     let trial = |unit: &Found| if unit.trial { "on trial" } else { "confirmed" };
     if json {
         let units = found.iter().map(|unit| {
@@ -64,6 +115,7 @@ pub fn show(found: &[Found], json: bool) -> Result<(), Failure> {
                 "state": trial(unit),
                 "other": unit.other(),
                 "floor": unit.status.floor,
+                "development": unit.development,
             })
         });
         return output::json(&units.collect::<Json>());

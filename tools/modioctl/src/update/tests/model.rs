@@ -5,7 +5,7 @@ use std::time::Duration;
 use register_map::board::MODIO_02;
 use register_map::codes::Command;
 use register_map::configuration::{COMMAND, KEY, OPENING_KEY};
-use register_map::state::{BOARD, COMMIT, FIRMWARE_VERSION, PRODUCT, PRODUCT_CODE, UPDATE};
+use register_map::state::{BOARD, BUILD, COMMIT, FIRMWARE_VERSION, PRODUCT, PRODUCT_CODE, UPDATE};
 use register_map::update::{BLOCK_BYTES, Header, Slot, State, block_at};
 
 /// Time in which a block is programmed.
@@ -42,6 +42,16 @@ pub struct Model {
     pub images: [[u16; 8]; 2],
     pub content: Vec<Option<[u8; BLOCK_BYTES]>>,
     pub trial: bool,
+    /// CRC-32 of both images.
+    pub crcs: [u32; 2],
+    /// Numbers of the loader's keys. Zeros as in a unit that does not report them: the loader takes every key.
+    pub keys: [u32; 2],
+    /// The first key is revoked.
+    pub revoked: bool,
+    /// The loader accepts a development key.
+    pub development: bool,
+    /// Its firmware has no records from the CRC-32s to the bitmap.
+    pub older: bool,
     /// Lowest security epoch that it accepts.
     pub floor: u16,
     /// Time in which a page is erased.
@@ -69,6 +79,11 @@ impl Model {
             images: [[1, 2, 0, 3, 4, 300, 0, 0], [0; 8]],
             content: Vec::new(),
             trial: false,
+            crcs: [0; 2],
+            keys: [0; 2],
+            revoked: false,
+            development: false,
+            older: false,
             floor: 0,
             page: Duration::from_millis(50),
             restart: Duration::from_secs(3),
@@ -106,6 +121,12 @@ impl Model {
             }
             8..16 => self.images[0][usize::from(record) - 8],
             16..24 => self.images[1][usize::from(record) - 16],
+            24..32 => {
+                let longs = [self.crcs, self.keys];
+                let long = longs.as_flattened()[usize::from(record - 24) / 2];
+                (long >> (16 * (1 - record % 2))) as u16
+            }
+            32 => self.revoked.into(),
             64.. => {
                 let first = usize::from(record - 64) * 16;
                 let bits = (0..16).filter(|bit| first + bit < self.blocks);
@@ -131,10 +152,25 @@ impl Model {
         (unit != 0 || self.flaw == Flaw::AnswersBroadcasts).then_some(answer)
     }
 
+    /// Returns whether the loader takes the running image, or the other one, by the key that signed it.
+    fn takes_key_of(&self, image: usize) -> bool {
+        let key = self.key_of(image);
+        let [first, second] = self.keys;
+        self.keys == [0; 2] || key == second || (key == first && !self.revoked)
+    }
+
+    const fn key_of(&self, image: usize) -> u32 {
+        let [.., high, low] = self.images[image];
+        (high as u32) << 16 | low as u32
+    }
+
     fn read(&self, pdu: &[u8], now: Duration) -> Result<Vec<u8>, u8> {
         let mut answer = vec![0x14, 0];
         for group in pdu[2..].chunks(7) {
             let [first, count] = [3, 5].map(|at| u16::from_be_bytes([group[at], group[at + 1]]));
+            if self.older && first < 24 && first + count > 24 {
+                return Err(2);
+            }
             answer.extend([1 + 2 * count as u8, 6]);
             let words = (first..first + count).map(|record| self.record(record, now));
             answer.extend(words.flat_map(u16::to_be_bytes));
@@ -167,7 +203,12 @@ impl Model {
                 self.content = vec![None; blocks];
             }
             let [words @ .., _, _] = header.words();
-            self.images[1] = words;
+            (self.images[1], self.crcs[1]) = (words, header.crc());
+        } else if block == 1 {
+            // The number of the key is at byte 156 of the header.
+            let (words, _) = bytes[28..32].as_chunks();
+            let words: Vec<_> = words.iter().copied().map(u16::from_be_bytes).collect();
+            self.images[1][6..].copy_from_slice(&words);
         }
         let begins = self.staged.last().map_or(now, |(end, _)| *end);
         self.staged.push((begins + BLOCK, block));
@@ -214,11 +255,20 @@ impl Model {
                     self.silent_until = now + self.restart;
                     self.state = State::Rejected(reason);
                 }
+                _ if !self.takes_key_of(1) => {
+                    self.silent_until = now + self.restart;
+                    self.state = State::Rejected(register_map::update::Reason::Signature);
+                }
                 _ => self.switch(now),
             },
-            Command::GoBack if self.state == State::Confirmed => self.switch(now),
+            Command::GoBack if self.state == State::Confirmed && self.takes_key_of(1) => {
+                self.switch(now);
+            }
             Command::Confirm if self.flaw == Flaw::ConfirmsLate => self.flaw = Flaw::None,
-            Command::Confirm => self.trial = false,
+            Command::Confirm if self.takes_key_of(0) => {
+                self.trial = false;
+                self.revoked |= self.keys != [0; 2] && self.key_of(0) == self.keys[1];
+            }
             _ => return Err(6),
         }
         Ok(pdu.to_vec())
@@ -229,6 +279,7 @@ impl Model {
         self.silent_until = now + self.restart;
         self.runs = self.runs.other();
         self.images.swap(0, 1);
+        self.crcs.swap(0, 1);
         self.state = State::Confirmed;
         self.trial = true;
         self.is_open = false;
@@ -245,6 +296,7 @@ impl Model {
             BOARD => MODIO_02.code,
             COMMIT => high,
             0x020D => low,
+            BUILD => u16::from(self.development) << 3,
             UPDATE => (self.runs as u16 + 1) | u16::from(self.trial) << 5,
             _ => 0,
         };

@@ -17,6 +17,12 @@ pub fn image(slot: Slot, length: usize) -> Vec<u8> {
     sealed(image)
 }
 
+/// Returns the image with the number of the key that signed it.
+pub fn signed(mut image: Vec<u8>, key: u32) -> Vec<u8> {
+    image[156..160].copy_from_slice(&key.to_be_bytes());
+    image
+}
+
 /// Returns the image with its CRC-32.
 pub fn sealed(mut image: Vec<u8>) -> Vec<u8> {
     let crc = crc32([&image[..20], &image[512..]]);
