@@ -1,5 +1,7 @@
 //! Identity and state, 0x0200 to 0x025F: read-only registers.
 
+use core::fmt;
+
 use crate::block::block;
 use crate::codes::{ChannelStatus, ModuleState};
 use crate::rule::Rule;
@@ -78,6 +80,8 @@ pub mod build {
     pub const NO_LOADER: u16 = 1 << 2;
     /// The loader accepts the development key.
     pub const DEVELOPMENT_TRUSTED: u16 = 1 << 3;
+    /// The version is no release: the one that has these numbers comes later.
+    pub const PRE_RELEASE: u16 = 1 << 4;
 
     /// Every bit with its name.
     pub const NAMES: &[(u8, &str)] = &[
@@ -85,7 +89,19 @@ pub mod build {
         (1, "signed with the development key"),
         (2, "no loader"),
         (3, "the loader accepts the development key"),
+        (4, "no release"),
     ];
+}
+
+/// Returns the version that FIRMWARE_VERSION, FIRMWARE_PATCH and BUILD hold, as the firmware writes it in texts: `0.3.0`,
+/// or `0.3.0-dev` where [`build::PRE_RELEASE`] says that it is no release.
+pub fn version([version, patch]: [u16; 2], build: u16) -> impl fmt::Display {
+    fmt::from_fn(move |f| {
+        let [major, minor] = version.to_be_bytes();
+        let no_release = build & build::PRE_RELEASE != 0;
+        let suffix = if no_release { "-dev" } else { "" };
+        write!(f, "{major}.{minor}.{patch}{suffix}")
+    })
 }
 
 /// Bits of UPDATE.

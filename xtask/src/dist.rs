@@ -154,7 +154,11 @@ fn texts(workspace: &Workspace, sources: &Sources, out: &Path) -> Result<()> {
     let library = Path::new(&sysroot).join("share/doc/rust/COPYRIGHT-library.html");
     fs::copy(library, out.join("THIRD-PARTY-rust-std.html"))?;
     let changes = fs::read_to_string(root.join("CHANGELOG.md"))?;
-    let section = section(&changes, &sources.version.to_string())?;
+    let heading = match &sources.version {
+        version if version.pre.is_empty() => version.to_string(),
+        _ => "Unreleased".to_owned(),
+    };
+    let section = section(&changes, &heading)?;
     Ok(fs::write(out.join("RELEASE-NOTES.md"), section)?)
 }
 

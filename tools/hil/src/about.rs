@@ -143,17 +143,18 @@ impl Unit {
         let [firmware, patch, map] = version[..] else {
             unreachable!("three registers were read");
         };
-        let commit = if map < MAP_WITH_COMMIT {
-            None
+        let (commit, build) = if map < MAP_WITH_COMMIT {
+            (None, 0)
         } else {
             let words = read(COMMIT, 3)?;
             let dirty = if words[2] & 1 == 0 { "" } else { "-dirty" };
-            Some(format!("{:04x}{:04x}{dirty}", words[0], words[1]))
+            let commit = format!("{:04x}{:04x}{dirty}", words[0], words[1]);
+            (Some(commit), words[2])
         };
         let identity = read(state::UNIQUE_ID, 6)?;
         Ok(Self {
             address: bench.unit(),
-            firmware: format!("{}.{}.{patch}", firmware >> 8, firmware & 0xFF),
+            firmware: state::version([firmware, patch], build).to_string(),
             commit,
             identity: identity.iter().map(|word| format!("{word:04X}")).collect(),
             modules,

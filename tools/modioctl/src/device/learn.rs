@@ -104,7 +104,9 @@ pub async fn known(device: &mut Device) -> Result<Option<Description>, Failure> 
     let modules = device
         .read_words(state::MODULE_IN_FORCE, points::PORTS)
         .await?;
-    let firmware = format!("{}.{}.{patch}", version >> 8, version & 0xFF);
+    // The first firmware has no such register.
+    let [build] = read(device, state::BUILD).await?.unwrap_or_default();
+    let firmware = state::version([version, patch], build).to_string();
     let module = |port: u16| {
         let code = modules.get(usize::from(port) - 1).copied();
         code.and_then(Module::from_code).unwrap_or(Module::None)

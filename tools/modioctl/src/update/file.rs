@@ -5,6 +5,7 @@ use std::path::Path;
 
 use register_map::Board;
 use register_map::layout::HEADER;
+use register_map::state;
 use register_map::update::{BLOCK_BYTES, Header, Manifest, Slot, crc32, intact};
 use sha2::{Digest as _, Sha512};
 
@@ -45,8 +46,8 @@ pub struct Version<'a>(pub &'a [u16; 8]);
 impl fmt::Display for Version<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [version, patch, epoch, high, low, ..] = *self.0;
-        let [major, minor] = version.to_be_bytes();
-        write!(f, "{major}.{minor}.{patch} ({high:04x}{low:04x})")?;
+        let version = state::version([version, patch], 0);
+        write!(f, "{version} ({high:04x}{low:04x})")?;
         if epoch > 0 {
             write!(f, " epoch {epoch}")?;
         }

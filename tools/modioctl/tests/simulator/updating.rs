@@ -5,10 +5,12 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
+use modio_description::{checksum, describe};
 use modioctl::bus::adu::Framing;
 use modioctl::update::File;
 use register_map::Module;
-use register_map::state::{BUILD, FIRMWARE_VERSION, UPDATE};
+use register_map::board::MODIO_02;
+use register_map::state::{BUILD, DESCRIPTION_CRC, FIRMWARE_VERSION, UPDATE};
 use register_map::update::{DEVELOPMENT_KEY, Slot, State};
 
 use crate::program::{At, Ran, has, modioctl};
@@ -246,6 +248,11 @@ fn a_file_by_the_second_key_ends_the_first_only_when_that_is_asked_for() {
     let done = "0.1.2 (00030004) -> 0.3.1 (1a2b3c4d) in slot B, confirmed";
     has(&ran.fine(), &[&format!("unit 1: {done}")]);
     assert!(line.units.lock().unwrap().iter().all(|unit| unit.revoked));
+    let ended =
+        "modioctl: the first key is ended in units 1-3: only the second signs updates there\n";
+    assert_eq!(line.run("update --status --units 1-3").err, ended);
+    let json = line.run("--json update --status").fine();
+    has(&json, &["\"first_key_ended\": true"]);
 }
 
 #[test]
@@ -315,16 +322,21 @@ fn units_that_accept_a_development_key_are_named_in_one_line() {
 }
 
 #[test]
-fn info_names_a_development_key_that_the_loader_accepts() {
-    for (build, accepts) in [(0b1010, true), (0b0010, false)] {
+fn info_names_a_development_key_that_the_loader_accepts_and_a_version_that_is_no_release() {
+    for (build, accepts, version) in [(0b1010, true, "0.1.0"), (0b1_0010, false, "0.1.0-dev")] {
+        // The unit does not serve its description, so the program must know it.
+        let description = describe(&MODIO_02, version, |_| Module::Di4);
+        let crc = (DESCRIPTION_CRC, checksum(&description.encode()));
         let registers = modio_02(Module::Di4).into_iter();
-        let mut server = server(registers.chain([(BUILD, build)]));
+        let mut server = server(registers.chain([(BUILD, build), crc]));
         let address = serve_requests(move |unit, pdu| Some(response(&mut server, unit, pdu)));
         let text = At::tcp(address).run("info").fine();
         let row = text.lines().find(|line| line.starts_with("  build "));
         let row = row.unwrap();
         let says = row.contains("the loader accepts the development key");
         assert_eq!(says, accepts, "{row}");
+        let no_release = version.ends_with("-dev");
+        assert_eq!(row.contains("no release"), no_release, "{row}");
     }
 }
 

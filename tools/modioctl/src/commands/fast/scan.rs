@@ -140,21 +140,18 @@ fn found(scan: &Scan, line: &Endpoint) -> Vec<Unit> {
 /// Returns what a unit is, for people.
 async fn identity(master: &mut Master, serial: u32) -> std::io::Result<String> {
     let first = state::PRODUCT_CODE;
-    let count = state::BOARD - first + 1;
+    let count = state::BUILD - first + 1;
     let words = match words(master, serial, first, count).await {
         Ok(Some(words)) => words,
         Ok(None) => Vec::new(),
         Err(lost) => return unread(lost),
     };
-    if let [high, low, version, patch, _, code] = words[..]
+    if let [high, low, version, patch, _, code, .., build] = words[..]
         && u32::from(high) << 16 | u32::from(low) == state::PRODUCT
     {
         let board = Board::from_code(code).map_or("with an unknown board", |board| board.name);
-        return Ok(format!(
-            "modio {board} {}.{}.{patch}",
-            version >> 8,
-            version & 0xFF
-        ));
+        let version = state::version([version, patch], build);
+        return Ok(format!("modio {board} {version}"));
     }
     match self::words(master, serial, register_map::name::NAME, LETTERS).await {
         Ok(Some(words)) => Ok(name(&words)),

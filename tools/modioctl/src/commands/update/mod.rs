@@ -55,6 +55,7 @@ pub async fn run(
     if options.status {
         show_units(&found, json)?;
         warn_of_development(&found);
+        say_of_ended_keys(&found);
         return report_all(failed);
     }
     let mut units = Vec::new();
@@ -174,14 +175,27 @@ fn report_all(mut failed: Vec<Failure>) -> Result<(), Failure> {
 
 /// Reports in one line which units accept a development key.
 fn warn_of_development(found: &[Found]) {
-    let units = found.iter().filter(|unit| unit.development);
-    let units: Vec<_> = units.map(|unit| unit.address).collect();
-    if !units.is_empty() {
+    if let Some(units) = those(found, |unit| unit.development) {
         eprintln!(
-            "modioctl: a development key, which everybody has, is accepted by {}: anybody on the line can install any firmware there (docs/update.md, Keys)",
-            named(&units)
+            "modioctl: a development key, which everybody has, is accepted by {units}: anybody on the line can install any firmware there (docs/update.md, Keys)"
         );
     }
+}
+
+/// Reports in one line which units have ended their first key.
+fn say_of_ended_keys(found: &[Found]) {
+    if let Some(units) = those(found, |unit| unit.status.revoked) {
+        eprintln!(
+            "modioctl: the first key is ended in {units}: only the second signs updates there"
+        );
+    }
+}
+
+/// Names the units for which this holds, if there are any.
+fn those(found: &[Found], holds: impl Fn(&Found) -> bool) -> Option<String> {
+    let units = found.iter().filter(|unit| holds(unit));
+    let units: Vec<_> = units.map(|unit| unit.address).collect();
+    (!units.is_empty()).then(|| named(&units))
 }
 
 /// Names units for people: unit 4; units 1-3, 7.

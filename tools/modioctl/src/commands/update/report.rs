@@ -1,5 +1,6 @@
 //! What `modioctl update` prints on standard output.
 
+use register_map::state;
 use register_map::update::BLOCK_BYTES;
 use serde_json::{Value as Json, json};
 
@@ -55,8 +56,8 @@ impl Transfer {
 pub fn show_file(file: &File, json: bool) -> Result<(), Failure> {
     let [image, _] = &file.images;
     let [version, patch, epoch, high, low, ..] = image.words;
-    let [major, minor] = version.to_be_bytes();
-    let (board, version) = (file.board.name, format!("{major}.{minor}.{patch}"));
+    let version = state::version([version, patch], 0).to_string();
+    let board = file.board.name;
     let commit = format!("{high:04x}{low:04x}");
     let (key, name) = (image.key(), key_name(image.key()));
     if json {
@@ -116,6 +117,7 @@ pub fn show_units(found: &[Found], json: bool) -> Result<(), Failure> {
                 "other": unit.other(),
                 "floor": unit.status.floor,
                 "development": unit.development,
+                "first_key_ended": unit.status.revoked,
             })
         });
         return output::json(&units.collect::<Json>());
