@@ -94,7 +94,7 @@ pub async fn link(device: &mut Device, text: &str) -> Result<(), Failure> {
     warn_of_alone(device, changes.iter().map(|(_, words)| words)).await
 }
 
-/// Returns the link to write: the one that has this source already, or else the first free one.
+/// Returns the link to write: the link that already has this source, or else the first free link.
 fn place(book: &Book, order: &Order, values: &[Vec<u16>]) -> Result<Item, Failure> {
     let links = || order.links.iter().zip(values);
     let same = links().find(|(_, words)| acts(words) && words.first() == order.words.first());
