@@ -3,7 +3,7 @@
 import dataclasses
 import re
 
-# What is not the same in every run, and what stands for it.
+# Patterns of texts that change from run to run, each with the text that takes their place.
 CHANGES = (
     (r"(?<![\d.])\d+\.\d+\.\d+(-dev)?(?=\s|$)", "VERSION"),
     (r"/dev/pts/\d+", "/dev/pts/N"),
@@ -62,6 +62,7 @@ def blocks(page: str) -> list[Block]:
                 here = re.search(r"<<'(\w+)'", line)
                 end_of_text = here and here[1]
             else:
+                assert block.commands, f"line {number}: an output without a command: {line}"
                 block.commands[-1].shown.append(line)
         found.append(block)
     return found
@@ -75,7 +76,7 @@ def plain(line: str) -> str:
 
 
 def difference(shown: list[str], printed: str) -> str:
-    """Compares an output with the lines of a page, in which `...` stands for any lines. Returns what is wrong, or ''."""
+    """Compares an output with the lines of a page, in which `...` stands for any lines. Returns the fault, or ''."""
     lines = [line for line in printed.splitlines() if not OF_BASH.fullmatch(line)]
     # Some programs end with an empty line.
     while lines and not lines[-1]:

@@ -10,7 +10,7 @@ import sys
 import time
 
 import pages
-from simulator import firmware
+from simulator import images
 
 # Seconds of the wall clock within which a command must end, or a simulator be ready.
 PATIENCE = 120
@@ -41,7 +41,7 @@ exit 1
 
 
 class Terminal:
-    """A bash of its own session, and a directory that it has in place of /tmp and of the home."""
+    """A bash in a session of its own. A directory takes the place of /tmp and of the home."""
 
     def __init__(self, directory: pathlib.Path):
         self.directory = directory
@@ -51,8 +51,8 @@ class Terminal:
         programs.mkdir()
         simulator = [os.environ["MODIO_SIM"]]
         for board in BOARDS:
-            for option, file in zip(*[iter(firmware(board))] * 2):
-                simulator += [option, f"{board}={file}"]
+            simulator += ["--loader", f"{board}={images(board)}/loader"]
+            simulator += ["--image", f"{board}={images(board)}/modio-a.image"]
         texts = {
             "cargo": CARGO.format(simulator=shlex.join(simulator)),
             "modioctl": MODIOCTL.format(modioctl=shlex.quote(os.environ["MODIOCTL"])),
@@ -62,12 +62,11 @@ class Terminal:
             (programs / name).chmod(0o755)
         # The environment of this test, which has pymodbus.
         (directory / "pymodbus").symlink_to(sys.prefix)
-        clean = {name: value for name, value in os.environ.items() if not name.startswith("MODIO")}
-        path = f"{programs}:{clean['PATH']}"
+        environment = {name: value for name, value in os.environ.items() if not name.startswith("MODIO")}
+        environment |= {"HOME": str(directory), "PATH": f"{programs}:{environment['PATH']}"}
         self.bash = subprocess.Popen(
             ["bash"], cwd=directory, stdin=subprocess.PIPE, stdout=(directory / "output").open("wb"),
-            stderr=subprocess.STDOUT, start_new_session=True,
-            env={**clean, "HOME": str(directory), "PATH": path})
+            stderr=subprocess.STDOUT, start_new_session=True, env=environment)
         # Numbers of jobs as in a shell that somebody uses.
         self.run("set -m")
 
@@ -91,6 +90,7 @@ class Terminal:
         return result
 
     def run_here(self, command: str) -> tuple[int, str]:
+        """Runs a command with the paths and ports of this test."""
         output = self.directory / "output"
         begin = output.stat().st_size
         # Nothing to read for the command, and a line that shows its end.

@@ -22,9 +22,28 @@ NOT_RUN = {
     ("README.md", "cargo xtask keygen"): "belongs to cargo xtask flash; xtask tests it",
     ("README.md", "cargo xtask build"): "is the step image",
     ("README.md", "st-flash"): "needs a probe",
-    ("README.md", "cargo xtask test"): "is what runs this test",
+    ("README.md", "cargo xtask test"): "contains this test",
     ("docs/commissioning.md", "modioctl --unit 1 watch p5.1 p5.2 --csv"): "does not end",
 }
+
+# Right and wrong commands.
+PAGE = """```console run
+$ echo version 0.3.0-dev
+version 0.3.0
+$ echo one
+two
+$ false
+$ (exit 3)                      # exit status 3
+$ seq 5
+1
+...
+5
+$ sleep 0.1 &
+```
+```console
+$ true
+```
+"""
 
 
 def reason(page: str, command: pages.Command) -> tuple[str, str] | None:
@@ -59,6 +78,8 @@ def faults_of(page: str, block: pages.Block, terminal: Terminal) -> list[str]:
             wrong.append(f"{where}: the block is not marked `console run`, and the test has no reason for it")
             continue
         if command.text.split(" #")[0].rstrip().endswith("&"):
+            if not command.shown:
+                wrong.append(f"{where}: shows no line for which to wait")
             status, printed = terminal.start(command.text, command.shown)
         else:
             status, printed = terminal.run(command.text)
@@ -70,15 +91,14 @@ def faults_of(page: str, block: pages.Block, terminal: Terminal) -> list[str]:
 
 
 class Console(unittest.TestCase):
-    maxDiff = None
-
     def test_the_commands_of_the_pages_print_what_the_pages_show(self):
         chosen = os.environ.get("MODIO_PAGES", " ".join(PAGES)).split()
         texts = [(ROOT / page).read_text() for page in chosen]
         # The simulators follow the wall clock, so the commands mostly wait.
         with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-            wrong = [fault for faults in pool.map(faults, chosen, texts) for fault in faults]
-        self.assertFalse(wrong, "\n\n" + "\n\n".join(wrong))
+            wrong = [fault for of_page in pool.map(faults, chosen, texts) for fault in of_page]
+        if wrong:
+            self.fail("\n\n" + "\n\n".join(wrong))
 
     def test_every_reason_is_that_of_a_command(self):
         commands = [(page, command) for page in PAGES for block in pages.blocks((ROOT / page).read_text())
@@ -87,10 +107,9 @@ class Console(unittest.TestCase):
         self.assertEqual(set(NOT_RUN) - used, set())
 
     def test_a_wrong_output_a_failure_and_an_unmarked_block_are_faults(self):
-        page = "```console run\n$ echo 0.3.0-dev on\n0.2.0 on\n$ echo one\ntwo\n$ false\n$ exit_status() { return 3; }\n" \
-            "$ exit_status                      # exit status 3\n$ seq 5\n1\n...\n5\n```\n```console\n$ true\n```\n"
-        self.assertEqual(faults("page.md", page), [
+        self.assertEqual(faults("page.md", PAGE), [
             "page.md:4: `echo one`\nthe page shows:\ntwo\nprinted was:\none",
             "page.md:6: `false`: exit status 1, expected 0",
+            "page.md:12: `sleep 0.1 &`: shows no line for which to wait",
             "page.md:15: `true`: the block is not marked `console run`, and the test has no reason for it",
         ])
