@@ -95,7 +95,7 @@ impl Master {
         for _ in 0..=self.endpoint().retries {
             match self.ask_fast(&request).await {
                 Ok(Reply::Pdu(pdu)) => return Ok(pdu),
-                Ok(_) | Err(Lost::Silent) => {}
+                Ok(_) | Err(Lost::Silent | Lost::Absent(_)) => {}
                 Err(Lost::Garbled(bytes)) => lost = Lost::Garbled(bytes),
                 Err(broken) => return Err(broken),
             }
@@ -107,7 +107,7 @@ impl Master {
     pub async fn scan_step(&mut self, scan: &mut Scan, request: &Request) -> io::Result<()> {
         scan.hear(match self.ask_fast(request).await {
             Ok(reply) => Heard::Reply(reply),
-            Err(Lost::Silent) => Heard::Nothing,
+            Err(Lost::Silent | Lost::Absent(_)) => Heard::Nothing,
             Err(Lost::Garbled(_)) => Heard::Damaged,
             Err(Lost::Broken(error)) => return Err(error),
         });

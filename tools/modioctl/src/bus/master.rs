@@ -3,10 +3,11 @@
 use std::io;
 use std::time::Duration;
 
-use tokio::time::{Instant, timeout, timeout_at};
+use tokio::time::{Instant, sleep, timeout, timeout_at};
 
 use super::adu::{ASCII_MOST, Framing};
 use super::endpoint::Endpoint;
+use super::gateway::{is_busy, is_from_gateway};
 use super::stream::Stream;
 use super::{Direction, Waiting};
 use crate::failure::Failure;
@@ -25,6 +26,9 @@ const STALE: usize = 16 * 1024;
 /// Time limit for the system to take the bytes of a frame, in addition to the time of the frame on the line.
 const SENDING: Duration = Duration::from_secs(2);
 
+/// Pause before a read is repeated because the unit or a gateway is busy.
+const BUSY: Duration = Duration::from_millis(200);
+
 /// Reads one register. The response never equals the request, so this shows whether an adapter returns what it sends.
 const PROBE: [u8; 5] = {
     let [high, low] = PRODUCT_CODE.to_be_bytes();
@@ -39,6 +43,8 @@ const NOISE: usize = 3;
 pub enum Lost {
     /// Nothing was received.
     Silent,
+    /// A gateway answered that the unit does not answer it: exception 0A or 0B.
+    Absent(u8),
     /// These bytes were received, and they are not an answer.
     Garbled(Vec<u8>),
     /// The port or the connection is lost.
@@ -118,21 +124,28 @@ impl Master {
         self.stream.discard_unsent();
     }
 
-    /// Sends a request to a unit, and repeats it as often as the endpoint says. Returns the PDU of the response, which
-    /// may be an exception. The error is that of the last attempt, unless an earlier one was garbled.
+    /// Sends a request to a unit, and repeats it as often as the endpoint says: without an answer of the unit, and a read
+    /// also when it is busy. Returns the PDU of the response, which may be an exception. The error is that of the last attempt, unless an earlier one was garbled.
     pub async fn ask(&mut self, unit: u8, pdu: &[u8]) -> Result<Vec<u8>, Lost> {
         if self.echo.is_none() && !differs(pdu) {
             self.look_for_echo(unit).await?;
         }
-        let mut garbled = None;
+        let mut result = Err(Lost::Silent);
         for _ in 0..=self.endpoint.retries {
-            match self.ask_once(unit, pdu).await {
-                Err(Lost::Silent) => {}
-                Err(Lost::Garbled(bytes)) => garbled = Some(bytes),
-                result => return result,
+            // The attempt before was answered: the unit is busy.
+            if result.is_ok() {
+                sleep(BUSY).await;
             }
+            let next = self.ask_once(unit, pdu).await;
+            match &next {
+                Ok(answer) if is_busy(pdu, answer) => {}
+                Ok(_) | Err(Lost::Broken(_)) => return next,
+                Err(Lost::Silent | Lost::Absent(_)) if is_garbled(&result) => continue,
+                Err(_) => {}
+            }
+            result = next;
         }
-        Err(garbled.map_or(Lost::Silent, Lost::Garbled))
+        result
     }
 
     /// Finds out whether the adapter returns what it sends. Without that a response that equals its request proves
@@ -269,7 +282,7 @@ impl Master {
                     if let Some((answer, range)) = waiting.find(bytes) {
                         self.received(bytes.get(range).unwrap_or_default());
                         self.note_no_echo(pdu);
-                        return Ok(answer);
+                        return present(answer);
                     }
                 }
                 until = Instant::now() + idle;
@@ -279,7 +292,7 @@ impl Master {
             if let Some(answer) = waiting.whole(&got) {
                 self.received(&got);
                 self.note_no_echo(pdu);
-                return Ok(answer);
+                return present(answer);
             }
             junk.append(&mut got);
             if never_silent || Instant::now() >= last {
@@ -332,6 +345,18 @@ impl Master {
                 bytes: bytes.to_vec(),
             });
         }
+    }
+}
+
+const fn is_garbled(result: &Result<Vec<u8>, Lost>) -> bool {
+    matches!(result, Err(Lost::Garbled(_)))
+}
+
+/// Returns the answer of a unit. A gateway answers for a unit that is absent.
+fn present(answer: Vec<u8>) -> Result<Vec<u8>, Lost> {
+    match answer[..] {
+        [0x80..=0xFF, code] if is_from_gateway(code) => Err(Lost::Absent(code)),
+        _ => Ok(answer),
     }
 }
 

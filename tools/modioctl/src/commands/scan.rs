@@ -260,7 +260,7 @@ async fn look_at(device: &mut Device) -> Result<Unit, Failure> {
     // Use what the unit does answer, even if it does not answer every request.
     fn answered<T: Default>(result: Result<T, Failure>) -> Result<T, Failure> {
         match result {
-            Err(Failure::Refused(_) | Failure::NoAnswer(_)) => Ok(T::default()),
+            Err(Failure::Refused(_) | Failure::Busy(_) | Failure::NoAnswer(_)) => Ok(T::default()),
             other => other,
         }
     }

@@ -4,6 +4,7 @@
 
 #![cfg(unix)]
 
+mod behind_gateway;
 mod bus;
 mod commands;
 mod errors;

@@ -46,7 +46,7 @@ fn positions(unit: u8) -> String {
 
 fn failure(serial: &str, lost: &Lost, place: &str) -> Failure {
     match lost {
-        Lost::Silent => Failure::NoAnswer(format!(
+        Lost::Silent | Lost::Absent(_) => Failure::NoAnswer(format!(
             "unit {serial} does not answer at {place}: `modioctl scan --fast` lists the serial numbers of the units on the line"
         )),
         Lost::Garbled(_) => Failure::Garbled(format!(

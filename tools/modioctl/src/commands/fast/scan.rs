@@ -162,7 +162,7 @@ async fn identity(master: &mut Master, serial: u32) -> std::io::Result<String> {
 
 fn unread(lost: Lost) -> std::io::Result<String> {
     match lost {
-        Lost::Silent => Ok("no identification: no answer".to_owned()),
+        Lost::Silent | Lost::Absent(_) => Ok("no identification: no answer".to_owned()),
         Lost::Garbled(_) => Ok("no identification: a damaged answer".to_owned()),
         Lost::Broken(error) => Err(error),
     }

@@ -1,0 +1,95 @@
+//! Tests with gateways, and with units that answer late.
+
+use std::net::SocketAddr;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use modbus_reference::Server;
+use modioctl::bus::adu::Framing;
+use register_map::Module;
+use register_map::state::UPDATE;
+
+use crate::gateway::Gateway;
+use crate::program::{At, has};
+use crate::served::{modio_02, response, serve_requests, server};
+
+const MS: Duration = Duration::from_millis(1);
+
+/// Serves these units over TCP with RTU frames.
+fn units(addresses: &'static [u8]) -> SocketAddr {
+    let mut server = modio();
+    serve_requests(move |unit, pdu| {
+        Some(match addresses.contains(&unit) {
+            true => response(&mut server, unit, pdu),
+            false => Vec::new(),
+        })
+    })
+}
+
+/// Returns a modio-02 with a loader.
+fn modio() -> Server {
+    server(modio_02(Module::Di4).into_iter().chain([(UPDATE, 1)]))
+}
+
+#[test]
+fn exceptions_0a_and_0b_are_asked_again_on_every_line() {
+    for code in [0x0A, 0x0B] {
+        let mut server = modio();
+        let mut requests = 0;
+        let line = serve_requests(move |unit, pdu| {
+            requests += 1;
+            Some(match requests % 3 {
+                0 => response(&mut server, unit, pdu),
+                _ => Framing::Rtu.frame(0, unit, &[pdu[0] | 0x80, code]),
+            })
+        });
+        for at in [
+            At::tcp(line),
+            At::modbus_tcp(Gateway::default().before(line)),
+        ] {
+            let text = at.run("read p5.1 FORMAT --raw").fine();
+            assert_eq!(text, "p5.1    0\nFORMAT  0\n");
+        }
+    }
+}
+
+#[test]
+fn a_unit_that_no_try_finds_behind_a_gateway_is_status_3() {
+    let requests = Arc::new(Mutex::new(0));
+    let count = Arc::clone(&requests);
+    let line = serve_requests(move |_, _| {
+        *count.lock().unwrap() += 1;
+        Some(Vec::new())
+    });
+    let wait = 30 * MS;
+    let gateway = Gateway {
+        wait,
+        ..Gateway::default()
+    };
+    let text = At::modbus_tcp(gateway.before(line)).run("read 0").failed(3);
+    has(
+        &text,
+        &["unit 1 does not answer the gateway", "exception 0B"],
+    );
+    assert_eq!(*requests.lock().unwrap(), 3, "one request and two retries");
+}
+
+#[test]
+fn a_read_is_repeated_while_the_unit_or_the_gateway_is_busy() {
+    for code in [5, 6] {
+        let busy = Gateway {
+            busy: Some(code),
+            ..Gateway::default()
+        };
+        let at = At::modbus_tcp(busy.before(units(&[1])));
+        assert_eq!(at.run("read p5.1").fine(), "p5.1  off\n", "{code:02X}");
+        let always = serve_requests(move |unit, pdu| {
+            Some(Framing::Rtu.frame(0, unit, &[pdu[0] | 0x80, code]))
+        });
+        for words in ["read p5.1", "info", "update --status"] {
+            let text = At::tcp(always).run(words).failed(1);
+            has(&text, &["unit 1", "busy", "again"]);
+            assert!(!text.contains("not a modio"), "{text}");
+        }
+    }
+}
