@@ -43,7 +43,7 @@ impl Master {
     pub async fn ask_fast(&mut self, request: &Request) -> Result<Reply, Lost> {
         let pdu = request.pdu();
         let sent = async {
-            self.settle(ADDRESS, &pdu).await?;
+            self.settle().await?;
             self.put(ADDRESS, &pdu).await
         };
         let own = sent.await.map_err(Lost::Broken)?;

@@ -8,6 +8,7 @@ use tokio::time::{Instant, sleep, timeout, timeout_at};
 use super::adu::{ASCII_MOST, Framing};
 use super::endpoint::Endpoint;
 use super::gateway::{is_busy, is_from_gateway};
+use super::late::Late;
 use super::stream::Stream;
 use super::{Direction, Waiting};
 use crate::failure::Failure;
@@ -30,7 +31,7 @@ const SENDING: Duration = Duration::from_secs(2);
 const BUSY: Duration = Duration::from_millis(200);
 
 /// Reads one register. The response never equals the request, so this shows whether an adapter returns what it sends.
-const PROBE: [u8; 5] = {
+pub const PROBE: [u8; 5] = {
     let [high, low] = PRODUCT_CODE.to_be_bytes();
     [3, high, low, 0, 1]
 };
@@ -72,13 +73,13 @@ pub struct Master {
     endpoint: Endpoint,
     stream: Stream,
     observer: Option<Observer>,
-    transaction: u16,
+    pub(super) transaction: u16,
     /// Time from which the next frame may be sent.
     free: Instant,
     /// Whether the adapter returns what it sends; `None` while that is not known.
-    echo: Option<bool>,
-    /// Unit and PDU of a request whose answer may still be received.
-    owed: Option<(u8, Vec<u8>)>,
+    pub(super) echo: Option<bool>,
+    /// Requests whose answer may still be received.
+    pub(super) late: Late,
 }
 
 impl Master {
@@ -91,7 +92,7 @@ impl Master {
             transaction: 0,
             free: Instant::now(),
             echo: None,
-            owed: None,
+            late: Late::default(),
         })
     }
 
@@ -130,6 +131,9 @@ impl Master {
         if self.echo.is_none() && !differs(pdu) {
             self.look_for_echo(unit).await?;
         }
+        if self.endpoint.framing != Framing::Mbap && self.late.can_be_confused(unit, pdu) {
+            self.wait_for_order(unit).await?;
+        }
         let mut result = Err(Lost::Silent);
         for _ in 0..=self.endpoint.retries {
             // The attempt before was answered: the unit is busy.
@@ -151,7 +155,7 @@ impl Master {
     /// Finds out whether the adapter returns what it sends. Without that a response that equals its request proves
     /// nothing. Silence leaves it open, and the request is sent nevertheless: a unit in listen-only mode obeys without
     /// an answer.
-    async fn look_for_echo(&mut self, unit: u8) -> Result<(), Lost> {
+    pub(super) async fn look_for_echo(&mut self, unit: u8) -> Result<(), Lost> {
         let mut result = Ok(());
         for _ in 0..=self.endpoint.retries {
             match self.ask_once(unit, &PROBE).await {
@@ -166,7 +170,7 @@ impl Master {
 
     /// Sends a request when the line is free. Returns before the request has been sent completely.
     async fn send(&mut self, unit: u8, pdu: &[u8]) -> io::Result<()> {
-        self.settle(unit, pdu).await?;
+        self.settle().await?;
         self.put(unit, pdu).await?;
         Ok(())
     }
@@ -205,15 +209,7 @@ impl Master {
     }
 
     /// Waits until the line is free, and discards received bytes: they answer no pending request.
-    pub(super) async fn settle(&mut self, unit: u8, pdu: &[u8]) -> io::Result<()> {
-        if let Some((asked, request)) = self.owed.take()
-            && self.endpoint.framing != Framing::Mbap
-            && asked == unit
-            && request != pdu
-        {
-            // A late answer could be mistaken for the answer to this request.
-            self.free = self.free.max(Instant::now() + self.endpoint.timeout);
-        }
+    pub(super) async fn settle(&mut self) -> io::Result<()> {
         // On a line that is never silent, the request is sent nevertheless.
         let most = self.free + self.endpoint.timeout;
         let mut discarded = 0;
@@ -225,6 +221,11 @@ impl Master {
                 return Ok(());
             }
             self.see(Direction::Response, &stale);
+            while self
+                .late
+                .take(self.endpoint.framing, &mut stale, None)
+                .is_some()
+            {}
             let gap = Instant::now() + self.endpoint.frame_gap();
             self.free = self.free.max(gap);
         }
@@ -244,7 +245,7 @@ impl Master {
         }
     }
 
-    async fn ask_once(&mut self, unit: u8, pdu: &[u8]) -> Result<Vec<u8>, Lost> {
+    pub(super) async fn ask_once(&mut self, unit: u8, pdu: &[u8]) -> Result<Vec<u8>, Lost> {
         self.send(unit, pdu).await.map_err(Lost::Broken)?;
         let sent = self.free;
         let waiting = Waiting {
@@ -254,10 +255,11 @@ impl Master {
             pdu,
         };
         let own = waiting.framing.frame(self.transaction, unit, pdu);
-        let last = sent + self.endpoint.timeout;
+        let mut last = sent + self.patience();
         // An answer that has begun in time has the same time again. Nothing is longer, except a line that is never
         // silent.
-        let end = last + self.endpoint.timeout + self.endpoint.time_of(ASCII_MOST);
+        let longest = self.endpoint.timeout + self.endpoint.time_of(ASCII_MOST);
+        let mut end = last + longest;
         let idle = BATCH + self.endpoint.time_of(12);
         let mut returned = false;
         let mut junk = Vec::new();
@@ -271,6 +273,15 @@ impl Master {
             };
             if read.map_err(Lost::Broken)? > 0 {
                 returned = returned || self.drop_echo(&own, &mut got);
+                if self.take_late(&mut got, Some((unit, pdu))) {
+                    // The unit, or a gateway, begins this request only now.
+                    last = Instant::now() + self.patience();
+                    end = last + longest;
+                    if got.is_empty() {
+                        until = last;
+                        continue;
+                    }
+                }
                 // A busy computer delivers an answer, or an echo, in pieces with a pause between them.
                 let mut all = [junk.as_slice(), &got].concat();
                 if !returned && self.drop_echo(&own, &mut all) {
@@ -300,7 +311,7 @@ impl Master {
             }
             until = last;
         }
-        self.owed = Some((unit, pdu.to_vec()));
+        self.late.add(&waiting, sent);
         if junk.is_empty() {
             return Err(Lost::Silent);
         }

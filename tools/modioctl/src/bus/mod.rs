@@ -4,6 +4,7 @@ mod broadcast;
 pub mod endpoint;
 mod fast;
 mod gateway;
+mod late;
 mod master;
 mod stream;
 mod sweep;

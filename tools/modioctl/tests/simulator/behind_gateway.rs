@@ -2,10 +2,12 @@
 
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex};
+use std::thread;
 use std::time::Duration;
 
 use modbus_reference::Server;
-use modioctl::bus::adu::Framing;
+use modioctl::bus::adu::{Framing, pdu, words_of};
+use modioctl::bus::{Endpoint, Lost, Master, Place};
 use register_map::Module;
 use register_map::state::UPDATE;
 
@@ -90,6 +92,61 @@ fn a_read_is_repeated_while_the_unit_or_the_gateway_is_busy() {
             let text = At::tcp(always).run(words).failed(1);
             has(&text, &["unit 1", "busy", "again"]);
             assert!(!text.contains("not a modio"), "{text}");
+        }
+    }
+}
+
+/// Reads two registers in turn from a unit that needs longer than the time-out for some answers. The value of each
+/// register is its address.
+#[track_caller]
+fn read_in_turn(place: Place, framing: Framing, retries: u8) {
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .unwrap();
+    runtime.block_on(async {
+        let endpoint = Endpoint {
+            timeout: 40 * MS,
+            retries,
+            baud: 921_600,
+            ..Endpoint::new(place, framing)
+        };
+        let mut master = Master::open(endpoint, None).await.unwrap();
+        let mut answered = 0;
+        for n in 0..40 {
+            let address = [0x10, 0x20][n % 2];
+            match master.ask(1, &pdu(3, address, 1)).await {
+                Ok(answer) => {
+                    assert_eq!(words_of(&answer), [address], "{framing:?}, read {n}");
+                    answered += 1;
+                }
+                Err(Lost::Silent) => {}
+                Err(lost) => panic!("{framing:?}, read {n}: {lost:?}"),
+            }
+        }
+        assert!(answered > 10, "{framing:?}: {answered}");
+    });
+}
+
+#[test]
+fn a_late_answer_is_never_mistaken_for_the_answer_to_another_request() {
+    for framing in [Framing::Rtu, Framing::Mbap] {
+        // `monitor` sends each request once.
+        for retries in [0, 2] {
+            let mut server = server((0..0x30).map(|n| (n, n)));
+            let mut random = fastrand::Rng::with_seed(1);
+            let line = serve_requests(move |unit, pdu| {
+                // Often twice in succession.
+                if random.bool() {
+                    thread::sleep(MS * random.u32(50..70));
+                }
+                Some(response(&mut server, unit, pdu))
+            });
+            let place = match framing {
+                Framing::Mbap => Place::ModbusTcp(Gateway::default().before(line).to_string()),
+                _ => Place::Tcp(line.to_string()),
+            };
+            read_in_turn(place, framing, retries);
         }
     }
 }
