@@ -54,6 +54,12 @@ impl Late {
         });
     }
 
+    /// Returns whether any late answer can be received.
+    pub fn is_expected(&mut self) -> bool {
+        self.forget_old();
+        !self.owed.is_empty()
+    }
+
     /// Returns whether a late answer of this unit can be mistaken for the answer to this request on a serial line.
     pub fn can_be_confused(&mut self, unit: u8, pdu: &[u8]) -> bool {
         self.forget_old();

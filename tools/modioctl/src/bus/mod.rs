@@ -13,7 +13,7 @@ pub use modbus_line::{Direction, Waiting, adu, decode};
 
 pub use endpoint::{Endpoint, Options, Place};
 pub(crate) use fast::{check_line, shared};
-pub use gateway::is_busy;
-pub use master::{Lost, MOST, Master, Observer, Seen};
+pub use gateway::{is_busy, sufficient};
+pub use master::{Lost, MOST, Master, Observer, PROBE, Seen};
 pub(crate) use stream::Stream;
 pub use sweep::{Found, LONG, REPORT, SHORT};

@@ -40,6 +40,8 @@ pub struct Found {
     pub units: BTreeSet<u8>,
     /// Addresses whose answer was garbled.
     pub garbled: BTreeSet<u8>,
+    /// Addresses for which a gateway had no time.
+    pub busy: BTreeSet<u8>,
     /// Whether bytes were received all the time. The sweep then ended early.
     pub never_silent: bool,
     /// Number of requests to each address for which no answer has been received.

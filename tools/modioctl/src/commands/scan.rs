@@ -8,7 +8,9 @@ use serde_json::json;
 
 use super::info::{Unidentified, identity};
 use crate::bus::adu::Framing;
-use crate::bus::{Endpoint, Found, LONG, Lost, Master, Observer, Place, REPORT, SHORT};
+use crate::bus::{
+    Endpoint, Found, LONG, Lost, Master, Observer, PROBE, Place, REPORT, SHORT, sufficient,
+};
 use crate::cli::Scan;
 use crate::device::{Device, known, place};
 use crate::failure::Failure;
@@ -36,6 +38,10 @@ struct Scanned {
     found: Found,
     line: Option<Endpoint>,
     echo: bool,
+    /// Addresses that gateways had no time for.
+    busy: Vec<u8>,
+    /// Longest time of a gateway's late answer.
+    late: Duration,
 }
 
 /// Looks for units at the requested rates and formats. Ctrl-C ends the scan, and keeps what was found. Returns whether
@@ -72,9 +78,23 @@ pub async fn run(
         scanned.keep_found();
     }
     print(&scanned, serial, json)?;
+    if !complete {
+        return Ok(false);
+    }
+    if scanned.late > Duration::ZERO {
+        return Err(Failure::NoAnswer(format!(
+            "the gateway answers late: --timeout {}s waits for all its answers",
+            sufficient(scanned.late)
+        )));
+    }
+    if !scanned.busy.is_empty() {
+        return Err(Failure::Busy(format!(
+            "a gateway, or the units themselves, had no time for addresses {}: scan them again",
+            scanned.busy.iter().map(u8::to_string).collect::<Vec<_>>().join(",")
+        )));
+    }
     let garbled = !scanned.garbled.is_empty() || !scanned.never_silent.is_empty();
     match (scanned.units.is_empty(), !garbled) {
-        _ if !complete => Ok(false),
         (false, _) => Ok(true),
         (true, false) => Err(Failure::Garbled(
             "no unit could be read: wrong rate or format, two units with one address, or no termination".to_owned(),
@@ -168,6 +188,10 @@ async fn search(
         scanned.found = Found::default();
         scanned.line = Some(line);
         sweep(&mut master, units, several, bar, &mut scanned.found).await?;
+        if master.endpoint().framing == Framing::Mbap {
+            scanned.late = master.lateness();
+        }
+        scanned.busy.extend(&scanned.found.busy);
         scanned.echo |= master.has_echo();
         master = look_at_found(master, scanned).await?;
     }
@@ -191,6 +215,10 @@ async fn sweep(
     bar.set_message(line.clone());
     let lost = |error| Failure::Port(format!("{} is lost ({error})", place(&endpoint)));
     let asked = |_| bar.inc(1);
+    if endpoint.framing == Framing::Mbap {
+        let sweep = master.sweep_gateway(units, found, asked);
+        return sweep.await.map_err(lost);
+    }
     if is_asked_once(&endpoint) {
         let sweep = master.sweep(units, endpoint.timeout, found, asked);
         return sweep.await.map_err(lost);
@@ -228,7 +256,7 @@ async fn look_at_found(mut master: Master, scanned: &mut Scanned) -> Result<Mast
         let unit = look_at(&mut device).await;
         master = device.master;
         match unit {
-            Ok(unit) => scanned.units.push(unit),
+            Ok(unit) => scanned.units.extend(unit),
             Err(Failure::Garbled(_)) if !scanned.found.garbled.contains(&address) => {
                 scanned.garbled.push(format!("{address} ({at})"));
             }
@@ -254,9 +282,9 @@ impl Scanned {
     }
 }
 
-/// Reads the identity of a unit. Fails when its answers are garbled, as those of two units with one address are, or
-/// when the port is lost.
-async fn look_at(device: &mut Device) -> Result<Unit, Failure> {
+/// Reads the identity of a unit. Returns `None` for the address of an absent unit. Fails when its answers are garbled, as
+/// those of two units with one address are, or when the port is lost.
+async fn look_at(device: &mut Device) -> Result<Option<Unit>, Failure> {
     // Use what the unit does answer, even if it does not answer every request.
     fn answered<T: Default>(result: Result<T, Failure>) -> Result<T, Failure> {
         match result {
@@ -276,6 +304,15 @@ async fn look_at(device: &mut Device) -> Result<Unit, Failure> {
         Err(Unidentified::Lost(lost @ (Lost::Garbled(_) | Lost::Broken(_)))) => {
             return Err(device.lost(&lost));
         }
+        // Some gateways reject functions that they do not pass, also for an absent unit. Function 03 they pass.
+        Err(Unidentified::Exception(_))
+            if matches!(
+                device.master.ask(device.unit, &PROBE).await,
+                Err(Lost::Absent(_))
+            ) =>
+        {
+            return Ok(None);
+        }
         Err(reason) => format!("no identification: {reason}"),
     };
     let description = answered(known(device).await)?;
@@ -285,12 +322,12 @@ async fn look_at(device: &mut Device) -> Result<Unit, Failure> {
         let named = ports.map(|port| (port.number, module_name(unit, port.module)));
         modules.extend(named.map(|(port, name)| format!("p{port} {name}")));
     }
-    Ok(Unit {
+    Ok(Some(Unit {
         address: device.unit,
         line: device.master.endpoint().clone(),
         identity,
         modules: modules.join(", "),
-    })
+    }))
 }
 
 fn print(scanned: &Scanned, serial: bool, json: bool) -> Result<(), Failure> {

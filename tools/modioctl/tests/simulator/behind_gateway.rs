@@ -96,6 +96,73 @@ fn a_read_is_repeated_while_the_unit_or_the_gateway_is_busy() {
     }
 }
 
+/// Each absent unit costs the gateway more than the time-out, so the answers to later requests are late as well.
+#[test]
+fn a_scan_waits_for_the_late_answers_of_a_gateway() {
+    for healthy in [&[2, 5, 6][..], &[6], &[]] {
+        let wait = 250 * MS;
+        let gateway = Gateway {
+            wait,
+            ..Gateway::default()
+        };
+        let at = At::modbus_tcp(gateway.before(units(healthy)));
+        let ran = at.run("--timeout 100ms scan --units 1-6");
+        let found = ran.out.lines().map(|line| line[..1].parse().unwrap());
+        assert_eq!(found.collect::<Vec<u8>>(), healthy, "{ran:?}");
+        assert_eq!(ran.status, 3, "{ran:?}");
+        has(&ran.err, &["the gateway answers late: --timeout 1s"]);
+    }
+}
+
+#[test]
+fn a_gateway_that_passes_only_standard_functions_creates_no_units() {
+    let wait = 20 * MS;
+    let gateway = Gateway {
+        only_standard: true,
+        wait,
+        ..Gateway::default()
+    };
+    let at = At::modbus_tcp(gateway.before(units(&[3])));
+    let text = at.run("scan --units 1-5").fine();
+    assert_eq!(text.lines().count(), 1, "{text}");
+    assert!(text.starts_with("3  "), "{text}");
+}
+
+/// Gateways that speak RTU answer for a missing unit as those for Modbus TCP do.
+#[test]
+fn a_gateway_with_rtu_frames_that_passes_only_standard_functions_creates_no_units() {
+    let mut server = modio();
+    let line = serve_requests(move |unit, pdu| {
+        Some(match (unit, pdu[0]) {
+            (3, 1..=7) => response(&mut server, unit, pdu),
+            (_, 1..=7) => Framing::Rtu.frame(0, unit, &[pdu[0] | 0x80, 0x0B]),
+            _ => Framing::Rtu.frame(0, unit, &[pdu[0] | 0x80, 1]),
+        })
+    });
+    let text = At::tcp(line).run("scan --units 1-5").fine();
+    assert!(
+        text.starts_with("3  ") && text.lines().count() == 1,
+        "{text}"
+    );
+}
+
+#[test]
+fn a_gateway_with_its_own_transaction_ids_is_status_4_and_creates_no_units() {
+    let gateway = Gateway {
+        own_ids: true,
+        ..Gateway::default()
+    };
+    let at = At::modbus_tcp(gateway.before(units(&[1])));
+    let ran = at.run("--timeout 50ms scan --units 1-3");
+    assert_eq!(ran.status, 4, "{ran:?}");
+    assert!(
+        !ran.out
+            .lines()
+            .any(|line| line.starts_with(char::is_numeric)),
+        "{ran:?}"
+    );
+}
+
 /// Reads two registers in turn from a unit that needs longer than the time-out for some answers. The value of each
 /// register is its address.
 #[track_caller]
