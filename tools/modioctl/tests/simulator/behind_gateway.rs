@@ -147,6 +147,18 @@ fn a_gateway_with_rtu_frames_that_passes_only_standard_functions_creates_no_unit
 }
 
 #[test]
+fn a_unit_has_a_loader_when_its_register_says_so() {
+    let gateway = Gateway {
+        only_standard: true,
+        ..Gateway::default()
+    };
+    let at = At::modbus_tcp(gateway.before(units(&[1])));
+    let text = at.run("update --status").failed(1);
+    has(&text, &["unit 1", "function 14", "gateway"]);
+    assert!(!text.contains("no loader"), "{text}");
+}
+
+#[test]
 fn a_gateway_with_its_own_transaction_ids_is_status_4_and_creates_no_units() {
     let gateway = Gateway {
         own_ids: true,

@@ -395,8 +395,8 @@ fn what_is_in_a_file_is_shown_without_a_unit() {
 
 #[test]
 fn a_unit_without_a_loader_cannot_be_updated() {
+    // Register UPDATE is 0.
     let mut server = server(modio_02(Module::Di4));
-    server.device.lacks.push(0x14);
     let address = serve_requests(move |unit, pdu| Some(response(&mut server, unit, pdu)));
     let line = Line::new(0, |_| ());
     let at = At::tcp(address);

@@ -52,6 +52,17 @@ async fn ask(device: &mut Device) -> Result<Found, Failure> {
     if long(&[high, low]) != PRODUCT {
         return Err(wrong("is not a modio"));
     }
+    // Firmware without the register is older than the loader.
+    let slots = match device.read_words(UPDATE, 1).await {
+        Err(Failure::Refused(_)) => Vec::new(),
+        slots => slots?,
+    };
+    let has = |words: &[u16], bits| words.iter().any(|word| word & bits != 0);
+    if !has(&slots, update::SLOT) {
+        return Err(wrong(
+            "has no loader, so it cannot be updated over the line: use a probe once",
+        ));
+    }
     let asked = Instant::now();
     let mut file = device
         .read_records(status::FILE, 0, status::REVOKED + 1)
@@ -62,28 +73,23 @@ async fn ask(device: &mut Device) -> Result<Found, Failure> {
             .read_records(status::FILE, 0, status::OTHER.end)
             .await;
     }
-    let file = match file {
-        Ok(file) => file,
-        Err(Failure::Refused(_)) => {
-            return Err(wrong(
-                "has no loader, so it cannot be updated over the line: use a probe once",
-            ));
-        }
-        Err(failure) => return Err(failure),
-    };
+    let file = file.map_err(|failure| match failure {
+        Failure::Refused(text) => Failure::Refused(format!(
+            "{text}; the unit has a loader, so a gateway probably does not pass function 14: an update needs functions 14 and 15"
+        )),
+        failure => failure,
+    })?;
     let time = asked.elapsed();
     let status = Status::of(&adu::words(&file)).ok_or_else(|| {
         wrong("reports an update that this program does not understand: a newer modioctl may be needed")
     })?;
-    let has = |words: Vec<u16>, bit| words.iter().any(|word| word & bit != 0);
-    let trial = has(device.read_words(UPDATE, 1).await?, update::TRIAL);
     let built = device.read_words(BUILD, 1).await?;
     Ok(Found {
         address: device.unit,
         board: Board::from_code(board),
         status,
-        trial,
-        development: has(built, build::DEVELOPMENT_TRUSTED),
+        trial: has(&slots, update::TRIAL),
+        development: has(&built, build::DEVELOPMENT_TRUSTED),
         time,
     })
 }
