@@ -1,5 +1,7 @@
 //! `modioctl scan`.
 
+mod left;
+
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -16,6 +18,11 @@ use crate::device::{Device, known, place};
 use crate::failure::Failure;
 use crate::names::module_name;
 use crate::output;
+use left::{Left, list};
+
+/// Why a unit may be silent although its line is right.
+const DELAYED: &str =
+    "a unit with a long RESPONSE_DELAY or over the air needs a longer `--timeout`";
 
 /// Shortest time that is worth an announcement.
 const LONG_SCAN: Duration = Duration::from_secs(10);
@@ -42,6 +49,9 @@ struct Scanned {
     busy: Vec<u8>,
     /// Longest time of a gateway's late answer.
     late: Duration,
+    /// Number of addresses that were silent.
+    silent: usize,
+    left: Left,
 }
 
 /// Looks for units at the requested rates and formats. Ctrl-C ends the scan, and keeps what was found. Returns whether
@@ -64,21 +74,20 @@ pub async fn run(
     }
     let mut scanned = Scanned::default();
     let bar = progress();
-    let complete = tokio::select! {
+    let result = tokio::select! {
         // Ctrl-C is handled before the scan begins.
         biased;
-        _ = tokio::signal::ctrl_c() => false,
-        result = search(lines, observer, &options.units, &bar, &mut scanned) => {
-            result?;
-            true
-        }
+        _ = tokio::signal::ctrl_c() => Ok(false),
+        result = search(lines, observer, &options.units, &bar, &mut scanned) => result.map(|()| true),
     };
     bar.finish_and_clear();
-    if !complete {
+    if !matches!(result, Ok(true)) {
         scanned.keep_found();
     }
-    print(&scanned, serial, json)?;
-    if !complete {
+    if scanned.line.is_some() {
+        print(&scanned, serial, json)?;
+    }
+    if !result.map_err(|failure| scanned.left.add_to(failure))? {
         return Ok(false);
     }
     if scanned.late > Duration::ZERO {
@@ -90,17 +99,22 @@ pub async fn run(
     if !scanned.busy.is_empty() {
         return Err(Failure::Busy(format!(
             "a gateway, or the units themselves, had no time for addresses {}: scan them again",
-            scanned.busy.iter().map(u8::to_string).collect::<Vec<_>>().join(",")
+            list(scanned.busy.iter().copied())
         )));
     }
     let garbled = !scanned.garbled.is_empty() || !scanned.never_silent.is_empty();
     match (scanned.units.is_empty(), !garbled) {
-        (false, _) => Ok(true),
+        (false, _) => {
+            if scanned.silent > 0 {
+                eprintln!("modioctl: silent addresses: {}; {DELAYED}", scanned.silent);
+            }
+            Ok(true)
+        }
         (true, false) => Err(Failure::Garbled(
             "no unit could be read: wrong rate or format, two units with one address, or no termination".to_owned(),
         )),
         (true, true) => Err(Failure::NoAnswer(format!(
-            "no unit found{}: check power, wiring (A and B swapped?) and rate (`--rates all`); a unit's address is its DIP switch; a unit with a long RESPONSE_DELAY or over the air needs a longer `--timeout`",
+            "no unit found{}: check power, wiring (A and B swapped?) and rate (`--rates all`); a unit's address is its DIP switch; {DELAYED}",
             match scanned.echo {
                 true => ", and the adapter returns what it sends, which is not an answer",
                 false => "",
@@ -183,13 +197,18 @@ async fn search(
         return Ok(());
     };
     let mut master = Master::open(first.clone(), observer).await?;
+    scanned.left.lines = lines.len();
     for line in lines {
         master.change_line(line.clone())?;
         scanned.found = Found::default();
         scanned.line = Some(line);
-        sweep(&mut master, units, several, bar, &mut scanned.found).await?;
+        scanned.left.lines -= 1;
+        let Scanned { found, left, .. } = scanned;
+        sweep(&mut master, units, several, bar, found, left).await?;
         if master.endpoint().framing == Framing::Mbap {
             scanned.late = master.lateness();
+        } else if !found.units.is_empty() {
+            scanned.silent += units.len() - found.units.union(&found.garbled).count();
         }
         scanned.busy.extend(&scanned.found.busy);
         scanned.echo |= master.has_echo();
@@ -206,6 +225,7 @@ async fn sweep(
     is_one_of_several: bool,
     bar: &ProgressBar,
     found: &mut Found,
+    left: &mut Left,
 ) -> Result<(), Failure> {
     let endpoint = master.endpoint().clone();
     let line = match &endpoint.place {
@@ -214,7 +234,7 @@ async fn sweep(
     };
     bar.set_message(line.clone());
     let lost = |error| Failure::Port(format!("{} is lost ({error})", place(&endpoint)));
-    let asked = |_| bar.inc(1);
+    let asked = left.begin(units, false, bar);
     if endpoint.framing == Framing::Mbap {
         let sweep = master.sweep_gateway(units, found, asked);
         return sweep.await.map_err(lost);
@@ -234,6 +254,7 @@ async fn sweep(
     bar.inc_length(silent.len() as u64);
     let message = format!("{line} silent addresses, {LONG:?} each");
     bar.set_message(message.trim().to_owned());
+    let asked = left.begin(&silent, true, bar);
     let sweep = master.sweep(&silent, LONG, found, asked);
     sweep.await.map_err(lost)
 }
