@@ -207,7 +207,7 @@ async fn search(
         sweep(&mut master, units, several, bar, found, left).await?;
         if master.endpoint().framing == Framing::Mbap {
             scanned.late = master.lateness();
-        } else if !found.units.is_empty() {
+        } else if !found.units.is_empty() && !found.never_silent {
             scanned.silent += units.len() - found.units.union(&found.garbled).count();
         }
         scanned.busy.extend(&scanned.found.busy);
