@@ -52,7 +52,18 @@ impl Failure {
 
     /// Returns the failure with the present action in front.
     pub fn while_doing(self, what: impl fmt::Display) -> Self {
-        let said = |text: String| format!("{what}: {text}");
+        self.said(|text| format!("{what}: {text}"))
+    }
+
+    /// Returns the failure with what the command has done until then, if there is anything to say.
+    pub fn after(self, note: &str) -> Self {
+        if note.is_empty() {
+            return self;
+        }
+        self.said(|text| format!("{text}; {note}"))
+    }
+
+    fn said(self, said: impl FnOnce(String) -> String) -> Self {
         match self {
             Self::Refused(text) => Self::Refused(said(text)),
             Self::Busy(text) => Self::Busy(said(text)),

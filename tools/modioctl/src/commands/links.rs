@@ -5,6 +5,7 @@ use register_map::configuration::COMM_TIMEOUT;
 use register_map::links::NO_SOURCE;
 use serde_json::{Value as Json, json};
 
+use super::note::Note;
 use super::write::UNSAVED;
 use crate::device::{Device, fetch_set};
 use crate::failure::Failure;
@@ -62,8 +63,8 @@ fn as_json(book: &Book, item: &Item, words: &[u16]) -> Json {
     })
 }
 
-/// Writes the link in `text`, or deletes the links of an output.
-pub async fn link(device: &mut Device, text: &str) -> Result<(), Failure> {
+/// Writes the link in `text`, or deletes the links of an output. `done` gets what is written.
+pub async fn link(device: &mut Device, text: &str, done: &Note) -> Result<(), Failure> {
     let book = fetch_set(device).await?;
     let mut note = None;
     let changes = match text.split_whitespace().collect::<Vec<_>>()[..] {
@@ -79,7 +80,7 @@ pub async fn link(device: &mut Device, text: &str) -> Result<(), Failure> {
             vec![(place(&book, &order, &values)?, order.words.to_vec())]
         }
     };
-    device.write_items(&changes).await?;
+    device.write_items(&changes, done).await?;
     for (item, words) in &changes {
         output::line(format_args!(
             "{}: {}",

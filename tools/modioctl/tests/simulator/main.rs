@@ -7,6 +7,7 @@
 mod behind_gateway;
 mod bus;
 mod commands;
+mod ending;
 mod errors;
 mod fast;
 mod gateway;

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use register_map::update::Slot;
 
-use super::config::Note;
+use super::note::Note;
 use super::watch::chosen;
 use crate::bus::adu::Framing;
 use crate::bus::{Endpoint, Observer};
@@ -99,7 +99,7 @@ pub async fn run(
     };
     // The rate of the line behind a server of Modbus TCP is not known, so broadcasts could be too fast.
     let unicast = options.unicast || endpoint.framing == Framing::Mbap;
-    "the same command goes on where it stopped".clone_into(&mut note.borrow_mut());
+    note.set("the same command goes on where it stopped");
     let mut drive = Drive {
         device: &mut device,
         little,
@@ -122,7 +122,7 @@ pub async fn run(
         });
         ended.extend_from_slice(campaign.units());
     }
-    note.borrow_mut().clear();
+    note.set("");
     report(&found, &ended, &transfers, device.master.endpoint(), json)?;
     report_all(ended.iter().filter_map(failure).collect())
 }
