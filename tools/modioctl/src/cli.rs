@@ -411,8 +411,9 @@ pub struct Update {
     /// Send the blocks to each unit alone
     #[arg(long, conflicts_with_all = ["status", "back"])]
     pub unicast: bool,
-    /// Send the firmware to units that already run it as well
-    #[arg(long, conflicts_with_all = ["status", "back"])]
+    /// Also send the firmware to units that run it already, and update units whose settings are not saved, which the
+    /// restart loses
+    #[arg(long, conflicts_with = "status")]
     pub force: bool,
     /// Let firmware that is signed with the second key of the units end their first key, for good
     #[arg(long, conflicts_with_all = ["status", "back"])]
