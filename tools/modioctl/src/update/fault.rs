@@ -36,7 +36,7 @@ impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Silent => {
-                "does not answer any more: check power and wiring, then run the same command again"
+                "does not answer any more: check power and wiring, and whether another program uses the line, then run the same command again"
             }
             Self::Refused(what, code) => {
                 let name = names::exception(*code).unwrap_or("unknown exception");

@@ -72,8 +72,10 @@ pub struct Unit {
     was_prepared: bool,
     /// The order to start the image was given again after its check was interrupted.
     was_interrupted: bool,
-    /// It was given up because it was silent, and is looked for once more.
+    /// It was given up because it was silent, and was looked for once more.
     was_silent: bool,
+    /// It has not answered since then.
+    is_sought: bool,
     silences: u8,
     orders: u8,
     polls: u8,
@@ -96,6 +98,7 @@ impl Unit {
             was_prepared: stage == Stage::Receiving,
             was_interrupted: false,
             was_silent: false,
+            is_sought: false,
             silences: 0,
             orders: 0,
             polls: 0,
@@ -163,13 +166,14 @@ impl Unit {
     /// Notes an answer.
     pub(super) const fn answered(&mut self) {
         self.silences = 0;
+        self.is_sought = false;
     }
 
     /// Notes that a request had no answer.
     pub(super) const fn silent(&mut self) {
         self.silences = self.silences.saturating_add(1);
         if matches!(self.stage, Stage::Restarting) {
-            let most = if self.was_silent {
+            let most = if self.is_sought {
                 RETURN_POLLS
             } else {
                 RESTART_POLLS
@@ -184,7 +188,7 @@ impl Unit {
     /// silent while it restarted.
     pub(super) fn look_again(&mut self) {
         if self.stage == Stage::Failed(Fault::Silent) && !self.was_silent {
-            self.was_silent = true;
+            (self.was_silent, self.is_sought) = (true, true);
             self.ordered(Stage::Restarting);
         }
     }

@@ -219,6 +219,15 @@ fn a_unit_that_another_program_has_updated_is_done_and_is_not_prepared_again() {
 }
 
 #[test]
+fn a_unit_that_comes_back_is_updated_and_has_all_the_time_to_restart() {
+    let mut bus = Bus::new(115_200, 1);
+    bus.units[0].flaw = Flaw::AwayAfter(200);
+    bus.units[0].restart = std::time::Duration::from_secs(15);
+    let campaign = update(&mut bus, false);
+    assert_eq!(stages(&campaign), [Stage::Done]);
+}
+
+#[test]
 fn a_slot_that_has_aged_gets_one_order_to_go_back() {
     let mut bus = Bus::new(9600, 1);
     let older = [0x0002, 0, 0, 7, 8, 200, 0, 0];

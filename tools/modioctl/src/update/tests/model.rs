@@ -23,6 +23,8 @@ pub enum Flaw {
     RestartsAfter(usize),
     /// It is gone when it has received this many blocks.
     GoneAfter(usize),
+    /// It does not answer for 9 s when it has received this many blocks.
+    AwayAfter(usize),
     /// It finds a wrong CRC-32 once.
     WrongCrc,
     /// Another program has updated it when it has received this many blocks.
@@ -234,6 +236,9 @@ impl Model {
             }
             Flaw::GoneAfter(blocks) if self.received == blocks => {
                 self.silent_until = Duration::MAX;
+            }
+            Flaw::AwayAfter(blocks) if self.received == blocks => {
+                self.silent_until = now + Duration::from_secs(9);
             }
             Flaw::UpdatedAfter(blocks) if self.received == blocks => {
                 self.switch(now);
