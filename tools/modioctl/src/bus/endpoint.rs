@@ -12,6 +12,7 @@ use modbus_line::{Format, LineFormat, t35};
 
 use super::adu::Framing;
 use crate::failure::Failure;
+use crate::input;
 
 /// Possible rates of a line in bit/s.
 pub const RATES: RangeInclusive<u32> = 50..=4_000_000;
@@ -298,9 +299,10 @@ impl Options {
             None => usual_file()?,
         };
         let shown = path.display();
-        let text = std::fs::read_to_string(&path).map_err(|error| {
-            Failure::usage(format!("--at {name}: cannot read {shown}: {error}"))
-        })?;
+        let bytes = input::read(&path)
+            .map_err(|what| Failure::usage(format!("--at {name}: cannot read {shown}: {what}")))?;
+        let text = input::text(&bytes)
+            .map_err(|what| Failure::usage(format!("--at {name}: {shown} {what}")))?;
         let mut tables: toml::Table = text.parse().map_err(|error: toml::de::Error| {
             Failure::usage(format!("{shown}: {}", error.message()))
         })?;

@@ -16,9 +16,6 @@ use crate::input;
 use crate::names::{Book, Item, Meaning, is_module, port_of, slots};
 use crate::value::{parse, show, takes};
 
-/// The largest file that is read. The settings of a unit take some KiB.
-const MOST: u64 = 1 << 20;
-
 /// Returns the text of a file.
 pub fn text(book: &Book, items: &[Item], values: &[Vec<u16>]) -> Result<String, Failure> {
     let about = book.of_modio()?;
@@ -68,22 +65,18 @@ struct Line {
 /// wrong.
 pub fn read(book: &Book, path: &Path) -> Result<Vec<Setting>, Failure> {
     let shown = path.display().to_string();
-    let bytes = input::read(path, MOST)
-        .map_err(|what| Failure::usage(format!("cannot read {shown}: {what}")))?;
+    let bytes =
+        input::read(path).map_err(|what| Failure::usage(format!("cannot read {shown}: {what}")))?;
     check(book, &shown, text_of(&shown, &bytes)?)
 }
 
 /// Returns the text in the bytes of a file.
 fn text_of<'a>(file: &str, bytes: &'a [u8]) -> Result<&'a str, Failure> {
-    let wrong = |what: &str| Failure::usage(format!("{file} {what}; nothing is written"));
-    if bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]) {
-        return Err(wrong(
-            "is UTF-16, as `>` of PowerShell writes it, and not UTF-8: write the file with `modioctl config export FILE`",
-        ));
-    }
-    let text = str::from_utf8(bytes).map_err(|_| wrong("is not a text in UTF-8"))?;
-    // Some editors begin a file with a byte order mark.
-    Ok(text.trim_start_matches('\u{FEFF}'))
+    input::text(bytes).map_err(|what| {
+        Failure::usage(format!(
+            "{file} {what}: `modioctl config export FILE` writes such a file; nothing is written"
+        ))
+    })
 }
 
 fn check(book: &Book, file: &str, text: &str) -> Result<Vec<Setting>, Failure> {
@@ -338,7 +331,7 @@ mod tests {
         let text_of_latin_1 = of(b"NAME = \xE4").unwrap_err().to_string();
         assert_eq!(
             text_of_latin_1,
-            "a is not a text in UTF-8; nothing is written"
+            "a is not a text in UTF-8: `modioctl config export FILE` writes such a file; nothing is written"
         );
         assert_eq!(of(b"\xEF\xBB\xBFBAUD = 9600\n").unwrap(), text);
     }

@@ -26,8 +26,8 @@ pub struct Found {
     pub trial: bool,
     /// Settings are in force and not saved, so that a restart loses them.
     pub unsaved: bool,
-    /// The loader accepts a development key.
-    pub development: bool,
+    /// Register BUILD.
+    pub build: u16,
     /// Time of the longest answer.
     pub time: Duration,
 }
@@ -86,7 +86,7 @@ async fn ask(device: &mut Device) -> Result<Found, Failure> {
         wrong("reports an update that this program does not understand: a newer modioctl may be needed")
     })?;
     let words = device.read_words(STATUS, BUILD - STATUS + 1).await?;
-    let [condition, .., built] = words[..] else {
+    let [condition, .., build] = words[..] else {
         return Err(wrong("does not report its state"));
     };
     Ok(Found {
@@ -95,12 +95,17 @@ async fn ask(device: &mut Device) -> Result<Found, Failure> {
         status,
         trial: has(&slots, update::TRIAL),
         unsaved: has(&[condition], state::status::UNSAVED),
-        development: has(&[built], build::DEVELOPMENT_TRUSTED),
+        build,
         time,
     })
 }
 
 impl Found {
+    /// Returns whether the loader accepts a development key.
+    pub const fn development(&self) -> bool {
+        self.build & build::DEVELOPMENT_TRUSTED != 0
+    }
+
     /// Returns the name of the board.
     pub fn board_name(&self) -> &'static str {
         self.board.map_or("a newer board", |board| board.name)
@@ -111,11 +116,16 @@ impl Found {
         &self.status.images[0]
     }
 
+    /// Returns the version of the running image.
+    pub const fn running(&self) -> Version<'_> {
+        Version::of_running(self.runs(), self.build)
+    }
+
     /// Describes the slot that does not run.
     pub fn other(&self) -> String {
         let Status { images, .. } = &self.status;
         let [_, other] = images;
-        let version = Version(other);
+        let version = Version::of(other);
         let Some(state) = self.status.state else {
             return "unknown state".to_owned();
         };
@@ -167,7 +177,7 @@ impl Found {
         if self.trial {
             return Err(format!(
                 "runs {} on trial: finish that update with its file, or wait half an hour until the unit has gone back",
-                Version(runs)
+                Version::of(runs)
             ));
         }
         let target = slot.other();
@@ -252,11 +262,11 @@ impl Found {
         match state {
             Some(State::Confirmed) if other[2] < *floor => Err(format!(
                 "cannot go back: {} is below security epoch {floor}",
-                Version(other)
+                Version::of(other)
             )),
             Some(State::Confirmed) if *revoked && key_of(other) == *first => Err(format!(
                 "cannot go back: {} is signed with the first key of the unit, which is revoked",
-                Version(other)
+                Version::of(other)
             )),
             Some(State::Confirmed) => Ok(Unit::back(self.address, slot.other(), *other)),
             Some(State::Rejected(Reason::NotConfirmed)) => Err(

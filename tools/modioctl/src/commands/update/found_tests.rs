@@ -19,9 +19,17 @@ fn found() -> Found {
         status: Status::of(&words).unwrap(),
         trial: false,
         unsaved: false,
-        development: false,
+        build: 0,
         time: Duration::ZERO,
     }
+}
+
+#[test]
+fn a_running_image_that_is_no_release_is_shown_as_such() {
+    let mut unit = found();
+    assert_eq!(unit.running().to_string(), "0.2.0 (00000000)");
+    unit.build = build::PRE_RELEASE;
+    assert_eq!(unit.running().to_string(), "0.2.0-dev (00000000)");
 }
 
 #[test]

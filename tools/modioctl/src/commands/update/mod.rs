@@ -228,7 +228,7 @@ fn show_all(failed: Vec<Failure>) {
 
 /// Reports in one line which units accept a development key.
 fn warn_of_development(found: &[Found]) {
-    if let Some(units) = those(found, |unit| unit.development) {
+    if let Some(units) = those(found, Found::development) {
         eprintln!(
             "modioctl: a development key, which everybody has, is accepted by {units}: anybody on the line can install any firmware there (docs/update.md, Keys)"
         );

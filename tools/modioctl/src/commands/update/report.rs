@@ -114,11 +114,11 @@ pub fn show_units(found: &[Found], json: bool) -> Result<(), Failure> {
                 "unit": unit.address,
                 "board": unit.board_name(),
                 "slot": format!("{:?}", unit.status.slot),
-                "runs": Version(unit.runs()).to_string(),
+                "runs": unit.running().to_string(),
                 "state": trial(unit),
                 "other": unit.other(),
                 "floor": unit.status.floor,
-                "development": unit.development,
+                "development": unit.development(),
                 "first_key_ended": unit.status.revoked,
             })
         });
@@ -130,7 +130,7 @@ pub fn show_units(found: &[Found], json: bool) -> Result<(), Failure> {
             unit.address.to_string(),
             unit.board_name().to_owned(),
             format!("{:?}", unit.status.slot),
-            Version(unit.runs()).to_string(),
+            unit.running().to_string(),
             trial(unit).to_owned(),
             unit.other(),
         ]
@@ -158,7 +158,10 @@ pub fn report(
             _ if unit.target == found.status.slot && !found.trial => "runs it already",
             _ => "confirmed",
         };
-        let [before, after] = [found.runs(), unit.image()].map(|words| Version(words).to_string());
+        let (before, after) = (
+            found.running().to_string(),
+            Version::of(unit.image()).to_string(),
+        );
         rows.push((unit.address, before, after, unit.target, result));
     }
     let mut all = Times::default();
