@@ -5,6 +5,15 @@
 
 #![forbid(unsafe_code)]
 
+/// Prints a line on standard error, in place of the macro of the standard library, which panics when standard error is
+/// closed. Nobody reads the line then, and the command goes on.
+macro_rules! eprintln {
+    ($($text:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stderr(), $($text)*);
+    }};
+}
+
 pub mod bus;
 pub mod cli;
 mod commands;

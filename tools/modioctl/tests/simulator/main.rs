@@ -5,6 +5,7 @@
 #![cfg(unix)]
 
 mod bus;
+mod closed;
 mod commands;
 mod errors;
 mod fast;
