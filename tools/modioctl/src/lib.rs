@@ -30,5 +30,6 @@ mod sniff;
 mod trace;
 pub mod update;
 mod value;
+mod warnings;
 
 pub use commands::run;

@@ -5,6 +5,7 @@ use crate::device::{Device, fetch};
 use crate::export::{Line, Source, text};
 use crate::failure::Failure;
 use crate::output;
+use crate::warnings::of_export;
 
 /// Writes a configuration of another system for the unit, or for several units of the line.
 pub async fn run(device: &mut Device, options: &Export) -> Result<(), Failure> {
@@ -21,6 +22,11 @@ pub async fn run(device: &mut Device, options: &Export) -> Result<(), Failure> {
                 "no export without unit {address}; connect it, or leave it out of --units"
             ))
         })?);
+    }
+    for source in &units {
+        if let Some(warning) = of_export(&source.book, source.unit) {
+            eprintln!("modioctl: warning: {warning}");
+        }
     }
     let text = text(
         options.format,

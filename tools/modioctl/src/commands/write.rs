@@ -40,7 +40,7 @@ pub async fn run(device: &mut Device, options: &Write, json: bool) -> Result<(),
         if is_unsaved {
             eprintln!("modioctl: {UNSAVED}");
         }
-        return Ok(());
+        return device.warn_of_links(&checked).await;
     }
     for (item, words) in &checked {
         if let Some(sources) = held.get(&item.name) {
@@ -58,7 +58,7 @@ pub async fn run(device: &mut Device, options: &Write, json: bool) -> Result<(),
     if is_unsaved {
         output::line(UNSAVED)?;
     }
-    Ok(())
+    device.warn_of_links(&checked).await
 }
 
 impl Device {

@@ -89,7 +89,9 @@ async fn description(device: &mut Device) -> Result<Option<(Description, String)
         None => Err("the unit has no identity, or this user has no home directory".to_owned()),
     };
     if let Err(why) = kept {
-        eprintln!("modioctl: the description is not stored, so the next command reads it again ({why})");
+        eprintln!(
+            "modioctl: the description is not stored, so the next command reads it again ({why})"
+        );
     }
     Ok(Some((read, "the unit".to_owned())))
 }

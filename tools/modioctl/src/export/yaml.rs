@@ -37,7 +37,9 @@ fn entry((key, value): (&Value, &Value)) -> Vec<String> {
         Value::Mapping(_) => "  ",
         scalar => return vec![format!("{key}: {}", lines(scalar).concat())],
     };
-    let below = lines(value).into_iter().map(|line| indent.to_owned() + &line);
+    let below = lines(value)
+        .into_iter()
+        .map(|line| indent.to_owned() + &line);
     std::iter::once(format!("{key}:")).chain(below).collect()
 }
 
@@ -69,7 +71,14 @@ mod tests {
 
     #[test]
     fn texts_and_numbers_read_back() {
-        let texts = ["yes", "1_0", "a\"b\\c", "\u{7F}\u{85}\u{2028}\u{1F600}", "°C", ""];
+        let texts = [
+            "yes",
+            "1_0",
+            "a\"b\\c",
+            "\u{7F}\u{85}\u{2028}\u{1F600}",
+            "°C",
+            "",
+        ];
         let yaml = text(&(texts, [0.1, 2.0, 1e-7, 1e20], -3)).unwrap();
         let (read, numbers, whole): (Vec<String>, Vec<f64>, i32) =
             serde_yaml_ng::from_str(&yaml).unwrap();

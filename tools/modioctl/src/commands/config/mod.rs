@@ -50,7 +50,8 @@ pub async fn run(
             Progress::new(note, changes.len())
                 .write(&mut device, &changes)
                 .await?;
-            output::line("written, but not saved: save with `modioctl config save`")
+            output::line("written, but not saved: save with `modioctl config save`")?;
+            device.warn_of_links(&changes).await
         }
         Config::Save => {
             device.unlock().await?;
@@ -77,6 +78,7 @@ pub async fn run(
             }
             let mut progress = Progress::new(note, rows.len());
             import(&mut device, &wanted, &file, &mut progress).await?;
+            device.warn_of_links(&wanted).await?;
             finish(device, restart).await
         }
         Config::Reset { restart } => {
