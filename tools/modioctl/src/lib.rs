@@ -14,6 +14,7 @@ macro_rules! eprintln {
     }};
 }
 
+mod adapter;
 pub mod bus;
 pub mod cli;
 mod commands;

@@ -15,6 +15,7 @@ mod importing;
 mod links;
 mod listening;
 mod monitor;
+mod naming;
 mod newer;
 mod ordinary;
 mod program;
