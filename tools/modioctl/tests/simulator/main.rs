@@ -27,3 +27,4 @@ mod terminal;
 mod trouble;
 mod unit;
 mod updating;
+mod watching;
