@@ -23,6 +23,7 @@ mod restart;
 mod scanning;
 mod screen;
 mod served;
+mod strange;
 mod terminal;
 mod trouble;
 mod unit;
