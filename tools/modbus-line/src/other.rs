@@ -57,7 +57,7 @@ impl Waiting<'_> {
         let transaction = u16::from_be_bytes([frame[0], frame[1]]);
         if !(1..=self.transaction).contains(&transaction) {
             return Some(format!(
-                "its transaction id {transaction:04X} is that of no request: the gateway does not return the id, or mixes up its masters"
+                "no request had its transaction id {transaction:04X}: the gateway does not return the id, or mixes up its masters"
             ));
         }
         if transaction < self.transaction && unit == self.unit {
@@ -217,7 +217,7 @@ mod tests {
         };
         for foreign in [0, 10, 0x1234] {
             let named = of(foreign, 11);
-            let text = format!("its transaction id {foreign:04X} is that of no request");
+            let text = format!("no request had its transaction id {foreign:04X}");
             assert!(named.starts_with(&text), "{named}");
         }
         assert!(of(8, 11).contains("earlier request"));

@@ -196,7 +196,7 @@ pub fn note(book: &Book, order: &Order) -> Option<String> {
     let (name, output) = (&source.name, &order.output);
     let wants_safe = format!("the link wants what {output}.safe says");
     Some(match Signal::from_code(reading.range)? {
-        // A warning says it.
+        // `warnings::of_links` warns of it.
         Signal::Voltage => return None,
         Signal::Current => format!(
             "while the loop of {name} is broken, {wants_safe}; a loop that fails high reads as above HIGH"

@@ -46,7 +46,7 @@ fn answers_of_gateways_and_other_units_are_named_by_every_command() {
             At::modbus_tcp(gateway(|_| Framing::Rtu.frame(0, 1, &[1, 1, 1]))),
             "use --tcp",
         ),
-        (tcp(0x1234), "transaction id 1234 is that of no request"),
+        (tcp(0x1234), "no request had its transaction id 1234"),
         (
             At::modbus_tcp(gateway(|request| {
                 let transaction = u16::from_be_bytes([request[0], request[1]]);
