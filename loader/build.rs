@@ -24,6 +24,10 @@ fn main() {
             panic!("{file}: two lines of 64 hexadecimal digits are needed, the public keys")
         });
     let numbers = keys.each_ref().map(|key| number(key));
+    assert_ne!(
+        numbers[0], numbers[1],
+        "{file}: the second key must be another one, which ends the first"
+    );
     let [first, second] = &keys;
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
     let development = public(DEVELOPMENT).iter().any(|key| keys.contains(key));

@@ -63,7 +63,7 @@ impl Edge {
         let number = usize::from(self.0.edge_interrupt());
         let bit = 1 << (number % 32);
         // SAFETY: the registers always exist, and writing 0 leaves the other interrupts as they are (PM0056 4.3.2, 4.3.3).
-        // The handler shares atomics only, and those with tasks of its own priority.
+        // The handler shares only atomics, and only with tasks of the same priority.
         unsafe {
             let nvic = &*pac::NVIC::PTR;
             let registers = if on { &nvic.iser } else { &nvic.icer };

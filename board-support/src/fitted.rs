@@ -14,10 +14,10 @@ pub struct Yes;
 
 /// Something that a board has or does not have.
 pub trait Fitted {
-    /// A type with one value if the board has it, and without values if not.
+    /// The proof: a type with one value if the board has the thing, or a type without values if it does not.
     type Proof: Copy;
 
-    /// Returns the proof, if there is one.
+    /// Returns the proof, or `None` if the board does not have the thing.
     fn proof() -> Option<Self::Proof>;
 }
 

@@ -149,8 +149,8 @@ impl Unit {
         }
     }
 
-    /// Returns the units that may follow a reset: those whose power fails or whose flash refuses after any number of
-    /// writes, and at the end the one that starts.
+    /// Returns the units that a reset may lead to: for each number of writes a unit whose power fails after them and a unit
+    /// whose flash refuses the next write, and last the unit that has started.
     fn started(self, asked: bool, switched: bool) -> Vec<Self> {
         let mut after = vec![self.without_power()];
         for writes in 0..=MOST_WRITES {

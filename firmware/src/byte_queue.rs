@@ -5,8 +5,8 @@ use core::sync::atomic::{AtomicU8, Ordering};
 /// Bytes that a queue holds: more than a UART at 9600 bit/s receives in the 40 ms for which a page of flash is erased.
 pub const CAPACITY: u8 = 64;
 
-/// A queue for one context that pushes and one that pops. It is meant to be a `static`. With more than one of either,
-/// bytes can be lost.
+/// A queue between one context that pushes and one context that pops. The queue is meant to be a `static`. With several
+/// contexts that push, or several that pop, bytes can be lost.
 #[derive(Debug)]
 pub struct ByteQueue {
     bytes: [AtomicU8; CAPACITY as usize],

@@ -222,7 +222,7 @@ impl Unit<'_> {
 
     /// Whatever has happened, the unit works after this.
     fn must_work(&mut self) {
-        // A unit that was told only to listen is told to start again (function 08 sub-function 01), without a reply.
+        // Function 08 sub-function 01 ends listen-only mode, without a reply.
         self.ask(UNIT, &[8, 0, 1, 0, 0]);
         let [serial @ .., _, _] = &self.ask(fast::ADDRESS, &[0x46, 1]).expect("it is found")[3..]
         else {

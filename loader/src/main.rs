@@ -35,7 +35,7 @@ use register_map::{
 const KEYS: [Key; 2] = include!(concat!(env!("OUT_DIR"), "/keys.rs"));
 
 /// The numbers of the keys, for the application.
-// SAFETY: the section has a place of its own in the linker's script, and nothing else in it.
+// SAFETY: the linker script has a separate place for the section, with nothing else in it.
 #[unsafe(link_section = ".keys")]
 #[used]
 static NUMBERS: [u8; keys::BYTES] = include!(concat!(env!("OUT_DIR"), "/numbers.rs"));

@@ -109,8 +109,8 @@ fn winners(baud: u32, count: u8, values: &[u32], limits: Limits, rng: &mut StdRn
         }
         match unit.arbitration.step() {
             Step::Send => {
-                // A UART may begin a character only at the next tick of its own bit clock. Then the start bit, and the
-                // parity bit of an FF with even parity.
+                // A UART may begin a character only at the next tick of its bit clock. The other units see two falling
+                // edges: that of the start bit, and that of the parity bit of an FF with even parity.
                 let bit = 1e6 / f64::from(baud);
                 let starts = now + extreme(rng, bit);
                 for (n, other) in units.iter_mut().enumerate() {

@@ -220,7 +220,8 @@ pub const ETH_IO5R: Board = ROWS[4].board();
 
 impl Board {
     /// All boards, in the order of their codes.
-    pub const ALL: [&'static Self; 5] = [&MODIO_02, &MODIO_08, &FX3U_14, &FX3U_24, &ETH_IO5R];
+    pub const ALL: [&'static Self; ROWS.len()] =
+        [&MODIO_02, &MODIO_08, &FX3U_14, &FX3U_24, &ETH_IO5R];
 
     /// Every code of register BOARD with the board's name.
     pub const NAMES: [(u16, &'static str); Self::ALL.len()] = {

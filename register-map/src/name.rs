@@ -1,5 +1,5 @@
-//! The name of the board for clients of function 70, 0x00C8 to 0x00DB: wb-modbus-ext-scanner reads it of each unit that
-//! it finds, and waits for ever when it gets an exception.
+//! The name of the board for clients of function 70, 0x00C8 to 0x00DB: wb-modbus-ext-scanner reads it from each
+//! unit that it finds, and never stops waiting after an exception.
 
 use crate::block::block;
 use crate::rule::Rule;

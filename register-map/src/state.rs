@@ -80,7 +80,7 @@ pub mod build {
     pub const NO_LOADER: u16 = 1 << 2;
     /// The loader accepts the development key.
     pub const DEVELOPMENT_TRUSTED: u16 = 1 << 3;
-    /// The version is no release: the one that has these numbers comes later.
+    /// The version is not a release: the release with these numbers comes later.
     pub const PRE_RELEASE: u16 = 1 << 4;
 
     /// Every bit with its name.

@@ -13,7 +13,7 @@ use register_map::update::Slot;
 use crate::error::usage;
 use crate::toolchain::TARGET;
 use crate::workspace::{self, Workspace};
-use crate::{image, signed};
+use crate::{image, keys, signed};
 
 /// The profile of the root Cargo.toml that the image is built with.
 pub const PROFILE: &str = "firmware";
@@ -107,6 +107,8 @@ pub fn image(workspace: &mut Workspace, board: &Board) -> Result<PathBuf> {
 
 /// Builds the loader, and returns its ELF file.
 pub fn loader(workspace: &mut Workspace, board: &Board) -> Result<PathBuf> {
+    // A build script could only panic.
+    keys::Pair::of(workspace)?;
     Ok(program(workspace, board, Program::Loader, None)?.elf)
 }
 

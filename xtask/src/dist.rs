@@ -5,8 +5,8 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use anyhow::{Context as _, Result};
-use ed25519_dalek::{SigningKey, VerifyingKey};
+use anyhow::Result;
+use ed25519_dalek::SigningKey;
 use fs_err as fs;
 use register_map::Board;
 use sha2::{Digest as _, Sha256};
@@ -27,6 +27,7 @@ mod tag;
 
 use notices::Notices;
 use paths::Paths;
+use signing::SUMS;
 
 /// What to build, and where to write it.
 #[derive(clap::Args, Clone, Debug)]
@@ -72,30 +73,31 @@ pub struct Options {
 }
 
 /// What signs the images.
-enum Signer {
+enum Signer<'a> {
     /// Nothing: the bytes to be signed are written.
     Nobody,
     Key(SigningKey),
     /// A directory with the signed images of the same sources, and the public keys.
-    Signed(PathBuf, [VerifyingKey; 2]),
+    Signed(PathBuf, &'a keys::Pair),
 }
 
 /// `cargo xtask dist`.
 pub fn run(workspace: &Workspace, options: &Options) -> Result<()> {
     // Before the builds, which take long.
     let sources = workspace.sources()?;
-    tag::check_commit(&sources)?;
+    tag::check_commit(&workspace.root, &sources)?;
     if let Some(tag) = &options.tag {
         tag::check(&workspace.root, tag, &sources, options.epoch_jump)?;
     }
+    let notes = notes(&workspace.root, &sources)?;
     let keys = match options.images {
         None => Some(options.keys.public(workspace)?),
         Some(_) => None,
     };
     let signer = match (&keys, &options.signed) {
-        (Some((public, _)), Some(directory)) => Signer::Signed(directory.clone(), *public),
-        (Some((public, _)), None) if !options.unsigned && options.files.is_none() => {
-            Signer::Key(options.keys.private(workspace, public)?)
+        (Some((pair, _)), Some(directory)) => Signer::Signed(directory.clone(), pair),
+        (Some((pair, _)), None) if !options.unsigned && options.files.is_none() => {
+            Signer::Key(options.keys.private(workspace, pair)?)
         }
         _ => Signer::Nobody,
     };
@@ -112,12 +114,12 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<()> {
     let target = programs::target(&rustc(&["--print", "host-tuple"])?);
     let workspace = &mut paths.reproducible(workspace, &target);
     let mut notices = Notices::default();
-    match (keys, &options.files, &options.signatures) {
-        (Some((public, _)), Some(files), Some(signatures)) => {
-            signing::finish(files, signatures, &sources, (&public, &options.keys), &out)?;
+    match (&keys, &options.files, &options.signatures) {
+        (Some((pair, _)), Some(files), Some(signatures)) => {
+            signing::finish(files, signatures, &sources, (pair, &options.keys), &out)?;
         }
         (Some((_, file)), ..) => {
-            workspace.keys = Some(file);
+            workspace.keys = Some(file.clone());
             for board in Board::ALL {
                 let mut release = board::Files {
                     workspace: &mut *workspace,
@@ -131,7 +133,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<()> {
             }
             // Those of the programs are in another file.
             core::mem::take(&mut notices).write(TARGET, &out)?;
-            texts(workspace, &sources, &out)?;
+            texts(workspace, &notes, &out)?;
             if options.unsigned {
                 return write_sums(&out);
             }
@@ -145,7 +147,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<()> {
 }
 
 /// Writes licences and release notes.
-fn texts(workspace: &Workspace, sources: &Sources, out: &Path) -> Result<()> {
+fn texts(workspace: &Workspace, notes: &str, out: &Path) -> Result<()> {
     let root = &workspace.root;
     for name in ["LICENSE-APACHE", "LICENSE-MIT"] {
         fs::copy(root.join(name), out.join(name))?;
@@ -153,41 +155,56 @@ fn texts(workspace: &Workspace, sources: &Sources, out: &Path) -> Result<()> {
     let sysroot = rustc(&["--print", "sysroot"])?;
     let library = Path::new(&sysroot).join("share/doc/rust/COPYRIGHT-library.html");
     fs::copy(library, out.join("THIRD-PARTY-rust-std.html"))?;
+    Ok(fs::write(out.join("RELEASE-NOTES.md"), notes)?)
+}
+
+/// Returns the section of the sources' version in the changelog. Between two releases that is "Unreleased".
+fn notes(root: &Path, sources: &Sources) -> Result<String> {
     let changes = fs::read_to_string(root.join("CHANGELOG.md"))?;
-    let heading = match &sources.version {
-        version if version.pre.is_empty() => version.to_string(),
-        _ => "Unreleased".to_owned(),
-    };
-    let section = section(&changes, &heading)?;
-    Ok(fs::write(out.join("RELEASE-NOTES.md"), section)?)
+    let version = &sources.version;
+    if version.pre.is_empty() {
+        let heading = version.to_string();
+        return section(&changes, &heading)
+            .filter(|text| !text.is_empty())
+            .map(str::to_owned)
+            .ok_or_else(|| {
+                usage(format!(
+                    "CHANGELOG.md has no section \"## {heading}\" with a text"
+                ))
+            });
+    }
+    Ok(section(&changes, "Unreleased")
+        .unwrap_or_default()
+        .to_owned())
 }
 
 /// Writes and shows the check sums of all files.
 fn write_sums(out: &Path) -> Result<()> {
     let sums = sums(out)?;
-    fs::write(out.join("SHA256SUMS"), &sums)?;
-    say!("{sums}{}", out.join("SHA256SUMS").display());
+    let file = out.join(SUMS);
+    fs::write(&file, &sums)?;
+    say!("{sums}{}", file.display());
     Ok(())
 }
 
-/// Returns the section of a version in a changelog, without its heading.
-fn section<'a>(changes: &'a str, version: &str) -> Result<&'a str> {
+/// Returns the section with this heading in a changelog, without the heading.
+fn section<'a>(changes: &'a str, heading: &str) -> Option<&'a str> {
     let mut sections = changes.split("\n## ");
-    let found = sections.find_map(|section| {
-        let (heading, text) = section.split_once('\n')?;
-        let text = text.trim_start();
-        (heading.split_whitespace().next() == Some(version) && !text.is_empty()).then_some(text)
-    });
-    found.with_context(|| format!("CHANGELOG.md has no section \"## {version}\" with a text"))
+    sections.find_map(|section| {
+        let (first, text) = section.split_once('\n')?;
+        (first.split_whitespace().next() == Some(heading)).then_some(text.trim_start())
+    })
 }
 
-/// Returns the sums of all files in a directory, in the order of their names, as `sha256sum` writes them.
+/// Returns the sums of all other files in a directory, in the order of their names, as `sha256sum` writes them.
 fn sums(directory: &Path) -> Result<String> {
     let mut sums = Vec::new();
     for file in fs::read_dir(directory)? {
         let file = file?;
         let name = file.file_name().to_string_lossy().into_owned();
-        sums.push((name, sha256(&fs::read(file.path())?)));
+        if name != SUMS {
+            sums.push((name, sha256(&fs::read(file.path())?)));
+        }
     }
     sums.sort_unstable();
     let lines = sums.iter().map(|(name, sum)| format!("{sum}  {name}\n"));
@@ -213,6 +230,7 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         fs::write(directory.path().join("b"), "abc").unwrap();
         fs::write(directory.path().join("a"), "").unwrap();
+        fs::write(directory.path().join("SHA256SUMS"), "sums").unwrap();
         let text = sums(directory.path()).unwrap();
         // The examples of FIPS 180-4 and of an empty file.
         let abc = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
@@ -221,12 +239,26 @@ mod tests {
     }
 
     #[test]
-    fn release_notes_are_the_section_of_the_version() {
+    fn release_notes_are_the_section_of_the_version_and_before_it_what_is_unreleased() {
+        let directory = tempfile::tempdir().unwrap();
+        let of = |version: &str, changes: &str| {
+            fs::write(directory.path().join("CHANGELOG.md"), changes).unwrap();
+            let sources = Sources {
+                version: version.parse().unwrap(),
+                commit: String::new(),
+                epoch: 0,
+            };
+            notes(directory.path(), &sources)
+        };
         let changes = "# Changelog\n\n## Unreleased\n\n## 0.2.0 - 2026-11-23\n\n### Added\n\n- A.\n\n## 0.1.0\n\n- B.\n";
-        assert_eq!(section(changes, "0.2.0").unwrap(), "### Added\n\n- A.\n");
-        assert_eq!(section(changes, "0.1.0").unwrap(), "- B.\n");
-        for absent in ["0.2", "Unreleased"] {
-            assert!(section(changes, absent).is_err(), "{absent}");
+        assert_eq!(of("0.2.0", changes).unwrap(), "### Added\n\n- A.\n");
+        assert_eq!(of("0.1.0", changes).unwrap(), "- B.\n");
+        assert_eq!(of("0.3.0-dev", changes).unwrap(), "");
+        let begun = changes.replace("## Unreleased\n", "## Unreleased\n\n- C.\n");
+        assert_eq!(of("0.3.0-dev", &begun).unwrap(), "- C.\n");
+        for absent in ["0.3.0", "0.2.1"] {
+            assert!(of(absent, changes).is_err(), "{absent}");
         }
+        assert!(of("0.2.0", "## 0.2.0\n\n## 0.1.0\n\n- B.\n").is_err());
     }
 }

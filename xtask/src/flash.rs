@@ -48,7 +48,7 @@ pub struct Options {
     keys: keys::Trusted,
 
     /// Write the image that runs without a loader. `--elf` writes such an image, too
-    #[arg(long, conflicts_with_all = ["slot", "key", "epoch"])]
+    #[arg(long, conflicts_with_all = ["slot", "key", "epoch", "end_first_key"])]
     plain: bool,
 
     /// Write through the ROM loader of the part at this serial port, with stm32flash: an adapter for 3.3 V at PA9 and
@@ -106,8 +106,9 @@ fn holds_loader(board: &Board, read: impl Fn(u32, u32) -> Result<Vec<u8>>) -> Re
     Ok(a? || b.unwrap_or(false))
 }
 
-/// Returns where the settings on a board have to go, and their pages, if they are in the pages of an image of the other
-/// kind. `is_alone` says that an image that runs without a loader will be written, `holds_loader` that there is one.
+/// Returns the settings on a board that must move, as a new address and the content of their pages. An image that runs
+/// alone and an image in a slot may store the settings in different pages. `is_alone`: the image to be written runs
+/// without a loader. `holds_loader`: the board has a loader now.
 fn settings(
     board: &Board,
     is_alone: bool,
@@ -153,7 +154,7 @@ fn forgotten(board: &Board, slot: Slot) -> [(u32, Vec<u8>); 2] {
 }
 
 impl Options {
-    /// Builds what is to be written. Returns it with the start address.
+    /// Builds the regions to be written. Returns them with the start address.
     fn regions(&self, workspace: &mut Workspace) -> Result<(Regions, u32)> {
         let board = self.board.given.board();
         let flat = |elf: &Path| {
@@ -171,7 +172,14 @@ impl Options {
             );
             return Ok((vec![(FLASH_BASE, bytes)], entry));
         }
-        keys::check_loader(workspace, self.signature.key())?;
+        // Before the builds, which take long.
+        self.signature.key(workspace)?;
+        if keys::Pair::of(workspace)?.has_development() {
+            eprintln!(
+                "xtask: this unit takes firmware from anybody on its line, because everybody has the development keys; \
+                 docs/update.md says how to make your own"
+            );
+        }
         let (loader, entry) = flat(&build::loader(workspace, board)?)?;
         let signed = signed::Options::signed(board, self.signature.clone());
         let image = signed::image(workspace, &signed, self.slot)?;

@@ -4,7 +4,7 @@
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result, anyhow, ensure};
+use anyhow::{Context as _, Result, anyhow};
 use ed25519_dalek::pkcs8::spki::der::pem::LineEnding;
 use ed25519_dalek::pkcs8::{DecodePrivateKey as _, EncodePrivateKey as _, KeypairBytes};
 use ed25519_dalek::{SigningKey, VerifyingKey};
@@ -19,7 +19,7 @@ const DEVELOPMENT: &str = "loader/keys/development.key";
 /// The public halves of this key and of a second one, which everybody has, too.
 const DEVELOPMENT_PUBLIC: &str = include_str!("../../loader/keys/development.pub");
 /// The public keys of the loader in a release.
-const PRODUCTION: &str = "loader/keys/production.pub";
+pub const PRODUCTION: &str = "loader/keys/production.pub";
 
 /// The file of a new key, or of one whose public half is shown.
 #[derive(clap::Args, Debug)]
@@ -44,6 +44,13 @@ pub struct Trusted {
 }
 
 impl Trusted {
+    #[cfg(test)]
+    pub fn of(file: &Path) -> Self {
+        Self {
+            keys: Some(file.to_owned()),
+        }
+    }
+
     /// Passes the keys to the builds.
     pub fn apply(&self, workspace: &mut Workspace) -> Result<()> {
         if let Some(file) = &self.keys {
@@ -71,23 +78,75 @@ pub struct Release {
     end_first_key: bool,
 }
 
-/// Refuses images by the second key that are not meant to end the first one, and images that are and do not. `keys` are
-/// those of the loader.
-pub fn check_second(
-    keys: &[VerifyingKey; 2],
-    by: &VerifyingKey,
-    end_first_key: bool,
-) -> Result<()> {
-    let [_, second] = keys;
-    match (by == second, end_first_key) {
-        (true, false) => Err(usage(
-            "the second key signs only images that end the first one in every unit that confirms them, for good; \
-             --end-first-key says that this is meant",
-        )),
-        (false, true) => Err(usage(
-            "--end-first-key: the first key signs these images, which ends nothing",
-        )),
-        _ => Ok(()),
+/// The two public keys that a loader trusts, the first and the second.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Pair {
+    keys: [VerifyingKey; 2],
+    /// Where they come from, for people.
+    of: String,
+}
+
+impl Pair {
+    /// Returns those that the loader is built with: of `--keys` or `MODIO_KEYS`, or the development keys.
+    pub fn of(workspace: &Workspace) -> Result<Self> {
+        match &workspace.keys {
+            Some(file) => Self::read(file),
+            None => Self::parse(DEVELOPMENT_PUBLIC, "the development keys".to_owned()),
+        }
+    }
+
+    fn read(path: &Path) -> Result<Self> {
+        let text = fs::read_to_string(path).map_err(|error| {
+            usage(format!(
+                "{error}: it has the two public keys, which `cargo xtask keygen` shows"
+            ))
+        })?;
+        Self::parse(&text, path.display().to_string())
+    }
+
+    fn parse(text: &str, of: String) -> Result<Self> {
+        let wrong = |what| usage(format!("{of}: {what}"));
+        let key = |line| VerifyingKey::from_bytes(&bytes(line)?).ok();
+        let keys: Option<Vec<_>> = text.lines().map(key).collect();
+        let keys = keys.and_then(|keys| <[VerifyingKey; 2]>::try_from(keys).ok());
+        let keys = keys.ok_or_else(|| {
+            wrong("two lines of 64 hexadecimal digits are needed, the public keys")
+        })?;
+        let [first, second] = keys.each_ref().map(|key| first_bytes(key.as_bytes()));
+        if first == second {
+            return Err(wrong(
+                "both keys have the same number: the second one must be another key, which ends the first",
+            ));
+        }
+        Ok(Self { keys, of })
+    }
+
+    /// Returns the keys, the first one first.
+    pub const fn keys(&self) -> &[VerifyingKey; 2] {
+        &self.keys
+    }
+
+    /// Refuses images by a key that the loader does not trust, images by the second key that are not meant to end the
+    /// first one, and images by the first key that are.
+    pub fn check(&self, by: &VerifyingKey, end_first_key: bool) -> Result<()> {
+        let [first, second] = &self.keys;
+        let why = match end_first_key {
+            _ if ![first, second].contains(&by) => format!(
+                "the loader would not start this image: it trusts {}, and another key signs; --keys and --key belong together",
+                self.of
+            ),
+            false if by == second => "the second key signs only images that end the first one in every unit that confirms \
+                 them, for good; --end-first-key says that this is meant"
+                .to_owned(),
+            true if by == first => "--end-first-key: the first key signs these images, which ends nothing".to_owned(),
+            _ => return Ok(()),
+        };
+        Err(usage(why))
+    }
+
+    /// Returns whether one of them is a development key.
+    pub fn has_development(&self) -> bool {
+        self.keys.iter().any(is_development)
     }
 }
 
@@ -139,120 +198,41 @@ pub fn read(workspace: &Workspace, path: Option<&Path>) -> Result<SigningKey> {
     private(&text).map_err(|why| usage(format!("{}: {why:#}", path.display())))
 }
 
-/// The same for a file that is signed again. The keys are those of `MODIO_KEYS`, of a release, or the development keys.
-pub fn check_second_of(
-    workspace: &Workspace,
-    by: &VerifyingKey,
-    end_first_key: bool,
-) -> Result<()> {
-    let production = workspace.root.join(PRODUCTION);
-    let lines = match &workspace.keys {
-        Some(file) => fs::read_to_string(file)?,
-        None if production.exists() => fs::read_to_string(production)?,
-        None => DEVELOPMENT_PUBLIC.to_owned(),
-    };
-    let key = |line| VerifyingKey::from_bytes(&bytes(line)?).ok();
-    let keys: Option<Vec<_>> = lines.lines().map(key).collect();
-    match keys.and_then(|keys| <[VerifyingKey; 2]>::try_from(keys).ok()) {
-        Some(keys) => check_second(&keys, by, end_first_key),
-        None => Ok(()),
-    }
-}
-
-/// Refuses a private key, or the development key, that the loader does not trust: it would never start the image. Says
-/// when a unit will take firmware of anybody.
-pub fn check_loader(workspace: &Workspace, key: Option<&Path>) -> Result<()> {
-    let own = digits(read(workspace, key)?.verifying_key().as_bytes());
-    let file = workspace.keys.as_deref();
-    let trusted = match file {
-        Some(file) => fs::read_to_string(file).map_err(|error| usage(error.to_string()))?,
-        None => DEVELOPMENT_PUBLIC.to_owned(),
-    };
-    if trusted.lines().all(|line| line != own) {
-        let of = file.map_or("the development keys".into(), |file| {
-            file.display().to_string()
-        });
-        return Err(usage(format!(
-            "the loader would not start this image: it trusts {of}, and another key signs; --keys and --key belong together"
-        )));
-    }
-    if DEVELOPMENT_PUBLIC
-        .lines()
-        .any(|line| trusted.contains(line))
-    {
-        eprintln!(
-            "xtask: this unit takes firmware from anybody on its line, because everybody has the development keys; \
-             docs/update.md says how to make your own"
-        );
-    }
-    Ok(())
-}
-
 impl Release {
     /// Returns the public keys, and their file.
-    pub fn public(&self, workspace: &Workspace) -> Result<([VerifyingKey; 2], PathBuf)> {
+    pub fn public(&self, workspace: &Workspace) -> Result<(Pair, PathBuf)> {
         let path = self.keys.clone();
         let path = path.unwrap_or_else(|| workspace.root.join(PRODUCTION));
-        let text = fs::read_to_string(&path).map_err(|error| {
-            usage(format!(
-                "{error}: it has the two public keys, which `cargo xtask keygen` shows"
-            ))
-        })?;
-        let keys = public(&text);
-        let keys = keys.map_err(|why| usage(format!("{}: {why:#}", path.display())))?;
-        Ok((keys, std::path::absolute(path)?))
+        let pair = Pair::read(&path)?;
+        if pair.has_development() {
+            return Err(usage(format!(
+                "{}: everybody has the development keys, so no release is signed with them",
+                path.display()
+            )));
+        }
+        Ok((pair, std::path::absolute(path)?))
     }
 
-    /// As the function of this name.
-    pub fn check_second(&self, keys: &[VerifyingKey; 2], by: &VerifyingKey) -> Result<()> {
-        check_second(keys, by, self.end_first_key)
+    /// Refuses images that this key has signed, as [`Pair::check`] does.
+    pub fn check(&self, pair: &Pair, by: &VerifyingKey) -> Result<()> {
+        pair.check(by, self.end_first_key)
     }
 
     /// Returns the private key, which must be that of one of the public keys.
-    pub fn private(&self, workspace: &Workspace, public: &[VerifyingKey; 2]) -> Result<SigningKey> {
+    pub fn private(&self, workspace: &Workspace, pair: &Pair) -> Result<SigningKey> {
         let path = self.key.as_ref().ok_or_else(|| {
             usage("no key to sign with: --key FILE, which `cargo xtask keygen FILE` makes, or --unsigned")
         })?;
         let key = read(workspace, Some(path))?;
-        check(&key.verifying_key(), public).map_err(|why| usage(why.to_string()))?;
-        self.check_second(public, &key.verifying_key())?;
+        self.check(pair, &key.verifying_key())?;
         Ok(key)
     }
 }
 
-/// Returns the public keys of a release from two lines.
-fn public(text: &str) -> Result<[VerifyingKey; 2]> {
-    let key = |line| VerifyingKey::from_bytes(&bytes(line)?).ok();
-    let keys: Option<Vec<_>> = text.lines().map(key).collect();
-    let keys = keys.and_then(|keys| <[VerifyingKey; 2]>::try_from(keys).ok());
-    let keys = keys.context("two lines of 64 hexadecimal digits are needed, the public keys")?;
-    keys.iter().try_for_each(refuse_development)?;
-    let [first, second] = keys.each_ref().map(|key| first_bytes(key.as_bytes()));
-    ensure!(
-        first != second,
-        "both keys have the same number: the second one must be another key, which ends the first"
-    );
-    Ok(keys)
-}
-
-/// Refuses a key whose public half is the development key, or that the loader does not trust.
-fn check(own: &VerifyingKey, public: &[VerifyingKey]) -> Result<()> {
-    refuse_development(own)?;
-    ensure!(
-        public.contains(own),
-        "the private key belongs to none of the public keys"
-    );
-    Ok(())
-}
-
-/// Refuses the development keys.
-fn refuse_development(key: &VerifyingKey) -> Result<()> {
+/// Returns whether everybody has the private half of this key.
+pub fn is_development(key: &VerifyingKey) -> bool {
     let key = digits(key.as_bytes());
-    ensure!(
-        DEVELOPMENT_PUBLIC.lines().all(|line| line != key),
-        "everybody has the development keys, so no release is signed with them"
-    );
-    Ok(())
+    DEVELOPMENT_PUBLIC.lines().any(|line| line == key)
 }
 
 /// Returns the first bytes of the SHA-512 of a public key, which name it in the header of an image.
@@ -312,65 +292,65 @@ mod tests {
         }
     }
 
-    #[test]
-    fn release_refuses_the_development_key_and_a_key_that_the_loader_does_not_trust() {
-        let keys = [1, 2, 3].map(|byte| SigningKey::from_bytes(&[byte; 32]));
-        let [own, safe, other] = keys.each_ref().map(SigningKey::verifying_key);
-        let second = workspace().root.join("loader/keys/development-second.key");
-        let both = [None, Some(&*second)];
-        let [development, second] =
-            both.map(|path| read(&workspace(), path).unwrap().verifying_key());
-        let lines = |keys: &[&VerifyingKey]| {
-            let lines: Vec<_> = keys.iter().map(|key| digits(key.as_bytes())).collect();
-            public(&(lines.join("\n") + "\n"))
-        };
-        let trusted = lines(&[&own, &safe]).unwrap();
-        assert!(check(&own, &trusted).is_ok() && check(&safe, &trusted).is_ok());
-        let refused = |result: Result<()>, part: &str| {
-            let text = result.unwrap_err().to_string();
-            assert!(text.contains(part), "{text}");
-        };
-        refused(check(&other, &trusted), "belongs to none");
-        assert!(check_second(&trusted, &own, false).is_ok());
-        assert!(check_second(&trusted, &safe, true).is_ok());
-        refused(check_second(&trusted, &safe, false), "--end-first-key says");
-        refused(check_second(&trusted, &own, true), "ends nothing");
-        refused(check(&development, &trusted), "everybody");
-        refused(lines(&[&own, &development]).map(drop), "everybody");
-        refused(check(&second, &trusted), "everybody");
-        refused(lines(&[&own]).map(drop), "two lines");
-        refused(lines(&[&own, &own]).map(drop), "same number");
-        let missing = Release {
-            key: None,
-            keys: Some("/nowhere/keys".into()),
-            end_first_key: false,
-        };
-        let error = missing.public(&workspace()).unwrap_err();
+    fn public(keys: &[&SigningKey]) -> String {
+        let line = |key: &&SigningKey| digits(key.verifying_key().as_bytes()) + "\n";
+        keys.iter().map(line).collect()
+    }
+
+    fn refused<T: std::fmt::Debug>(result: Result<T>, part: &str) {
+        let error = result.unwrap_err();
         assert!(error.is::<crate::error::Usage>(), "{error}");
+        assert!(error.to_string().contains(part), "{error}");
     }
 
     #[test]
-    fn image_that_the_loader_would_not_start_is_refused_before_it_is_written() {
-        let directory = tempfile::tempdir().unwrap();
-        let [own, other, lines] = ["own", "other", "keys"].map(|name| directory.path().join(name));
-        let both = [&own, &other].map(|file| {
-            generate(file).unwrap();
-            let key = read(&workspace(), Some(file)).unwrap();
-            digits(key.verifying_key().as_bytes()) + "\n"
-        });
-        fs::write(&lines, both[0].repeat(2)).unwrap();
-        let mut of_own = workspace();
-        of_own.keys = Some(lines.clone());
-        assert!(check_loader(&of_own, Some(&own)).is_ok());
-        for (workspace, key) in [
-            (&of_own, Some(&*other)),
-            (&of_own, None),
-            (&workspace(), Some(&own)),
+    fn loader_trusts_two_keys_and_the_second_signs_only_when_asked_to_end_the_first() {
+        let keys = [1, 2, 3].map(|byte| SigningKey::from_bytes(&[byte; 32]));
+        let [first, second, other] = &keys;
+        let of = |keys: &[&SigningKey]| Pair::parse(&public(keys), "keys.pub".to_owned());
+        let pair = of(&[first, second]).unwrap();
+        let capital = public(&[first, second]).to_uppercase();
+        assert_eq!(Pair::parse(&capital, "keys.pub".to_owned()).unwrap(), pair);
+        for (keys, part) in [
+            (&[][..], "two lines"),
+            (&[first], "two lines"),
+            (&[first, second, other], "two lines"),
+            (&[first, first], "same number"),
         ] {
-            let error = check_loader(workspace, key).unwrap_err();
-            assert!(error.is::<crate::error::Usage>(), "{error}");
+            refused(of(keys), part);
         }
-        assert!(check_loader(&workspace(), None).is_ok());
+        let check = |by: &SigningKey, end| pair.check(&by.verifying_key(), end);
+        assert!(check(first, false).is_ok() && check(second, true).is_ok());
+        refused(check(second, false), "--end-first-key says");
+        refused(check(first, true), "ends nothing");
+        refused(check(other, false), "trusts keys.pub");
+        refused(check(other, true), "trusts keys.pub");
+        assert!(!pair.has_development());
+    }
+
+    #[test]
+    fn release_refuses_the_development_keys_and_a_missing_file() {
+        let directory = tempfile::tempdir().unwrap();
+        let file = directory.path().join("keys.pub");
+        let release = Release {
+            key: None,
+            keys: Some(file.clone()),
+            end_first_key: false,
+        };
+        refused(release.public(&workspace()), "keys.pub");
+        let own = SigningKey::from_bytes(&[1; 32]);
+        let second = workspace().root.join("loader/keys/development-second.key");
+        for development in [None, Some(&*second)] {
+            let development = read(&workspace(), development).unwrap();
+            // Capital digits are the same key.
+            let lines = public(&[&own, &development]).to_uppercase();
+            fs::write(&file, lines).unwrap();
+            refused(release.public(&workspace()), "everybody");
+        }
+        let safe = SigningKey::from_bytes(&[2; 32]);
+        fs::write(&file, public(&[&own, &safe])).unwrap();
+        let (pair, _) = release.public(&workspace()).unwrap();
+        refused(release.private(&workspace(), &pair), "no key to sign with");
     }
 
     #[test]

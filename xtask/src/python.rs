@@ -6,7 +6,7 @@ use std::process::Command;
 
 use anyhow::{Context as _, Result, ensure};
 use register_map::Board;
-use register_map::board::{FX3U_24, MODIO_02, MODIO_08};
+use register_map::board::{FX3U_14, FX3U_24, MODIO_02, MODIO_08};
 
 use crate::error::missing;
 use crate::workspace::Workspace;
@@ -21,6 +21,9 @@ const RUN: &str = "tools/sim/tests/pymodbus/run.py";
 /// The tests of the simulator's page, and the script for its pictures. Chromium shows the page, and Playwright controls
 /// Chromium.
 const PAGE: &str = "tools/sim/tests/page";
+
+/// The tests of the commands in the documents.
+const CONSOLE: &str = "tools/sim/tests/console";
 
 /// Returns the interpreter of the environment `target/NAME-venv`, in which the packages of these files are installed.
 /// The error is [`Missing`](crate::error::Missing).
@@ -82,6 +85,24 @@ pub fn masters(workspace: &mut Workspace) -> Result<()> {
 pub fn page(workspace: &mut Workspace) -> Result<()> {
     let mut script = on_page(workspace, RUN)?;
     command::run(script.arg("--tests").arg(workspace.root.join(PAGE)))
+}
+
+/// Runs the blocks `console run` of README.md and docs/, with the programs that these commands build.
+pub fn console(workspace: &mut Workspace) -> Result<()> {
+    for program in ["curl", "mbpoll"] {
+        ensure!(
+            which::which(program).is_ok(),
+            missing(format!(
+                "no {program}, which the documents use (on Debian: apt-get install {program})"
+            ))
+        );
+    }
+    let python = environment(workspace, "pymodbus", &[PYMODBUS])?;
+    let modioctl = workspace.program("modioctl")?;
+    let boards = [&MODIO_02, &MODIO_08, &FX3U_14, &FX3U_24];
+    let mut script = script(workspace, &python, RUN, &boards)?;
+    script.env("MODIOCTL", modioctl);
+    command::run(script.arg("--tests").arg(workspace.root.join(CONSOLE)))
 }
 
 /// `cargo xtask screenshots`.

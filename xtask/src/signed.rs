@@ -1,6 +1,6 @@
 //! `cargo xtask image` and `sign`: the file of an update, with the signed images for both slots.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::{Context as _, Result, anyhow, ensure};
 use ed25519_dalek::{Signature, Signer as _, SigningKey, VerifyingKey};
@@ -26,6 +26,9 @@ pub struct Options {
     #[command(flatten)]
     signature: How,
 
+    #[command(flatten)]
+    keys: keys::Trusted,
+
     /// Where to write the file; without it BOARD.modio beside the images
     #[arg(long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -35,9 +38,13 @@ pub struct Options {
 #[derive(clap::Args, Clone, Debug, Default)]
 #[group(skip)]
 pub struct How {
-    /// Private key, 64 hexadecimal digits; without it the development key, which everybody has
+    /// Private key of `cargo xtask keygen`; without it the development key, which everybody has
     #[arg(long, value_name = "FILE")]
     key: Option<PathBuf>,
+
+    /// The second key signs, to end the first one in every unit that confirms these images, for good
+    #[arg(long)]
+    end_first_key: bool,
 
     /// Security epoch: once an image is confirmed, no image with a lower one is accepted [default: that in the root
     /// Cargo.toml]
@@ -46,9 +53,11 @@ pub struct How {
 }
 
 impl How {
-    /// Returns the file of the private key, if it is not the development key.
-    pub fn key(&self) -> Option<&Path> {
-        self.key.as_deref()
+    /// Returns the private key. One by which the loader of this workspace would not start an image is refused.
+    pub fn key(&self, workspace: &Workspace) -> Result<SigningKey> {
+        let key = keys::read(workspace, self.key.as_deref())?;
+        keys::Pair::of(workspace)?.check(&key.verifying_key(), self.end_first_key)?;
+        Ok(key)
     }
 }
 
@@ -60,11 +69,19 @@ pub struct Again {
     file: PathBuf,
 
     #[command(flatten)]
-    signature: How,
+    keys: keys::Trusted,
+
+    /// Private key of `cargo xtask keygen`
+    #[arg(long, value_name = "FILE")]
+    key: PathBuf,
 
     /// The second key signs, to end the first one in every unit that confirms this image, for good
     #[arg(long)]
     end_first_key: bool,
+
+    /// Security epoch [default: that of the file, which must be that in the root Cargo.toml]
+    #[arg(long, value_name = "NUMBER")]
+    epoch: Option<u16>,
 
     /// Where to write the signed file; without it the file is replaced
     #[arg(long, value_name = "FILE")]
@@ -82,6 +99,7 @@ impl Options {
         Self {
             build: build::Options { board },
             signature,
+            keys: keys::Trusted::default(),
             output: None,
         }
     }
@@ -89,9 +107,11 @@ impl Options {
 
 /// `cargo xtask image`.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
-    if options.signature.key.is_none() {
+    options.keys.apply(workspace)?;
+    let key = options.signature.key(workspace)?;
+    if keys::is_development(&key.verifying_key()) {
         eprintln!(
-            "xtask: signed with the development key, which everybody has; --key FILE names another"
+            "xtask: signed with a development key, which everybody has; --keys and --key name your own (docs/update.md, Keys)"
         );
     }
     let (_, file) = update(workspace, options)?;
@@ -100,18 +120,22 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
 }
 
 /// `cargo xtask sign`.
-pub fn again(workspace: &Workspace, options: &Again) -> Result<()> {
-    let How { key, epoch } = &options.signature;
-    let key = keys::read(workspace, key.as_deref())?;
-    keys::check_second_of(workspace, &key.verifying_key(), options.end_first_key)?;
+pub fn again(workspace: &mut Workspace, options: &Again) -> Result<()> {
+    options.keys.apply(workspace)?;
+    let how = How {
+        key: Some(options.key.clone()),
+        end_first_key: options.end_first_key,
+        epoch: options.epoch,
+    };
+    let key = how.key(workspace)?;
     let path = &options.file;
     let bytes = fs::read(path).map_err(|error| usage(error.to_string()))?;
     let mut images = images(&bytes).map_err(|why| usage(format!("{}: {why:#}", path.display())))?;
     let tree = workspace.sources()?.epoch;
     for image in &mut images {
         let own = u16::from_le_bytes([image[6], image[7]]);
-        match epoch {
-            Some(epoch) => put_epoch(image, *epoch),
+        match options.epoch {
+            Some(epoch) => put_epoch(image, epoch),
             None if own == tree => {}
             None => {
                 return Err(usage(format!(
@@ -143,11 +167,10 @@ pub fn update(workspace: &mut Workspace, options: &Options) -> Result<([PathBuf;
 /// Builds the image for a slot, signs it, and returns its file.
 pub fn image(workspace: &mut Workspace, options: &Options, slot: Slot) -> Result<PathBuf> {
     let board = options.build.board;
-    let How { key, epoch } = &options.signature;
-    let key = keys::read(workspace, key.as_deref())?;
+    let key = options.signature.key(workspace)?;
     let elf = build::program(workspace, board, Program::Slot(slot), None)?.elf;
     let mut sources = workspace.sources()?;
-    sources.epoch = epoch.unwrap_or(sources.epoch);
+    sources.epoch = options.signature.epoch.unwrap_or(sources.epoch);
     let mut image = unsigned(board, slot, &image::read(&elf)?, &sources)?;
     sign(&mut image, &key);
     let file = elf.with_extension("image");
@@ -205,10 +228,9 @@ pub fn signed_part(image: &[u8]) -> &[u8] {
     &image[..92]
 }
 
-/// Gives an image the epoch and the signature of the same image in the file of an update.
-pub fn sign_as(image: &mut [u8], signed: &[u8], public: &[VerifyingKey]) -> Result<()> {
-    put_epoch(image, u16::from_le_bytes([signed[6], signed[7]]));
-    put_signature(image, &signed[92..156], public).map(drop)
+/// Returns the signature of an image.
+pub fn signature(image: &[u8]) -> &[u8] {
+    &image[92..156]
 }
 
 /// Gives an image a signature, and the number of the key that made it, which must be one of these.
@@ -326,7 +348,7 @@ mod tests {
     }
 
     #[test]
-    fn signing_again_changes_epoch_and_signature_and_is_the_same_each_time() {
+    fn signing_again_changes_the_signature_and_the_epoch_when_asked_and_is_the_same_each_time() {
         let [first, second] = [7, 8].map(|byte| SigningKey::from_bytes(&[byte; 32]));
         let of = |slot: Slot, key, epoch| {
             let address = MODIO_02.layout().slots[slot as usize] + HEADER;
@@ -335,37 +357,50 @@ mod tests {
         };
         let signed = |key, epoch| file(&Slot::ALL.map(|slot| of(slot, key, epoch)));
         let [mut a, _] = images(&signed(&first, 0)).unwrap();
-        let signature = of(Slot::A, &second, 4);
-        sign_as(&mut a, &signature, &[second.verifying_key()]).unwrap();
-        assert_eq!(a, signature);
-        assert!(sign_as(&mut a, &signature, &[first.verifying_key()]).is_err());
-        assert!(sign_as(&mut a, &of(Slot::B, &first, 4), &[first.verifying_key()]).is_err());
+        let mut put = |from: Vec<u8>, public: &SigningKey| {
+            let public = [public.verifying_key()];
+            put_signature(&mut a, signature(&from), &public).map(drop)
+        };
+        assert!(put(of(Slot::A, &second, 0), &first).is_err());
+        assert!(put(of(Slot::B, &first, 0), &first).is_err());
+        assert!(put(of(Slot::A, &first, 4), &first).is_err());
+        put(of(Slot::A, &second, 0), &second).unwrap();
+        assert_eq!(a, of(Slot::A, &second, 0));
 
         let directory = tempfile::tempdir().unwrap();
-        let [path, key] = ["modio-02.modio", "key"].map(|name| directory.path().join(name));
+        let [path, key, public] =
+            ["modio-02.modio", "key", "keys.pub"].map(|name| directory.path().join(name));
         fs::write(&path, signed(&first, 0)).unwrap();
         fs::write(&key, "08".repeat(32)).unwrap();
-        let options = Again {
+        let line = |key: &SigningKey| {
+            let bytes = key.verifying_key().to_bytes();
+            bytes.map(|byte| format!("{byte:02x}")).concat() + "\n"
+        };
+        fs::write(&public, line(&first) + &line(&second)).unwrap();
+        let mut options = Again {
             file: path.clone(),
-            signature: How {
-                key: Some(key),
-                epoch: Some(4),
-            },
-            end_first_key: false,
+            keys: keys::Trusted::of(&public),
+            key,
+            epoch: Some(4),
+            end_first_key: true,
             output: None,
         };
-        let workspace = Workspace::open().unwrap();
+        let mut workspace = Workspace::open().unwrap();
         for _ in 0..2 {
-            again(&workspace, &options).unwrap();
+            again(&mut workspace, &options).unwrap();
             assert_eq!(fs::read(&path).unwrap(), signed(&second, 4));
         }
+        options.end_first_key = false;
+        let error = again(&mut workspace, &options).unwrap_err();
+        assert!(error.to_string().contains("--end-first-key"), "{error}");
+        options.end_first_key = true;
         for (at, length) in [(700, 3200), (3190, 3200), (0, 127)] {
             let mut damaged = signed(&first, 0);
             damaged[at] ^= 1;
             damaged.truncate(length);
             fs::write(&path, damaged).unwrap();
-            let error = again(&workspace, &options).unwrap_err();
-            assert!(error.is::<crate::error::Usage>(), "{at}: {error}");
+            let error = again(&mut workspace, &options).unwrap_err();
+            assert!(error.to_string().contains("damaged"), "{at}: {error}");
         }
     }
 }

@@ -13,7 +13,7 @@ use register_map::Board;
 use register_map::board::{FX3U_24, MODIO_02, MODIO_08};
 
 use crate::error::{missing, usage};
-use crate::python::{masters, page};
+use crate::python::{console, masters, page};
 use crate::renode::checks;
 use crate::steps::{self, Done};
 use crate::workspace::{ALL, SUITE, Workspace};
@@ -67,7 +67,7 @@ pub const MODIO: [&Board; 2] = [&MODIO_02, &MODIO_08];
 
 /// The steps in the order in which they run: command, name, description, function. The names do not change. A step that
 /// runs for each board has the board's number or name at the end of its name, such as `lint-02` or `lint-eth-io5r`.
-const STEPS: [(In, &str, &str, Run); 22] = [
+const STEPS: [(In, &str, &str, Run); 23] = [
     (Ci, "fmt", "formatting", Once(formatting)),
     (Ci, "lint-host", "lints, host", Once(lint_host)),
     (Ci, "lint", "lints, target", Each(lint_target)),
@@ -83,6 +83,7 @@ const STEPS: [(In, &str, &str, Run); 22] = [
     (Test, "modioctl", "modioctl on the simulator", Once(tool)),
     (Test, "pymodbus", "pymodbus and mbpoll", Once(masters)),
     (Test, "page", "the simulator's page", Once(page)),
+    (Test, "console", "commands in the documents", Once(console)),
     (Test, "renode", "files for Renode", Once(checks::files)),
     (Ci, "sim-slow", "sim, slow corner", Once(sim_slow)),
     (Ci, "sim-fast", "sim, fast corner", Once(sim_fast)),
@@ -450,12 +451,14 @@ mod tests {
         let workflow = include_str!("../../.github/workflows/ci.yml");
         let words: BTreeSet<&str> = workflow.split_whitespace().collect();
         let mut seen = BTreeSet::new();
+        let mut missing = Vec::new();
         for name in names(&[], Ci).unwrap() {
-            assert!(
-                words.contains(name.as_str()),
-                "{name} is in no job of ci.yml"
-            );
+            if !words.contains(name.as_str()) {
+                missing.push(name.clone());
+            }
             assert!(seen.insert(name.clone()), "{name} is the name of two steps");
         }
+        let missing = missing.join(" ");
+        assert!(missing.is_empty(), "no job of ci.yml runs: {missing}");
     }
 }

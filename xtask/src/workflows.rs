@@ -1,11 +1,9 @@
 //! Tests of the workflows of GitHub, which nothing here can run.
 
 use std::collections::BTreeMap;
-use std::path::Path;
-use std::process::Command;
 
-use ed25519_dalek::{Signer as _, SigningKey};
 use register_map::Board;
+use serde_yaml_ng::Value;
 
 /// The workflows of CI and of the nights.
 const WORKFLOWS: [&str; 2] = [
@@ -16,13 +14,12 @@ const WORKFLOWS: [&str; 2] = [
 #[test]
 fn matrix_of_every_board_runs_at_night() {
     let [_, nightly] = WORKFLOWS;
-    for board in Board::ALL {
-        let run = format!("run: cargo xtask matrix --board {board}\n");
-        assert!(
-            nightly.contains(&run),
-            "{board} is in no job of nightly.yml"
-        );
-    }
+    let runs = Board::ALL.map(|board| format!("run: cargo xtask matrix --board {board}\n"));
+    let missing: String = runs
+        .into_iter()
+        .filter(|run| !nightly.contains(run))
+        .collect();
+    assert!(missing.is_empty(), "no job of nightly.yml has:\n{missing}");
 }
 
 #[test]
@@ -57,6 +54,8 @@ fn every_install_command_uses_the_lock_file() {
 #[cfg(unix)]
 #[test]
 fn files_of_a_release_that_differ_from_their_check_sums_are_refused() {
+    use std::process::Command;
+
     let directory = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| {
         std::fs::write(directory.path().join(name), text).unwrap();
@@ -81,108 +80,181 @@ fn files_of_a_release_that_differ_from_their_check_sums_are_refused() {
     assert!(!accepted(sums));
 }
 
-/// A job of a workflow: what it may do, and its steps.
+/// The steps of a job.
 #[derive(serde::Deserialize)]
 struct Job {
-    environment: Option<String>,
-    steps: Vec<serde_yaml_ng::Value>,
+    steps: Vec<Value>,
 }
 
 #[derive(serde::Deserialize)]
 struct Workflow {
+    on: Value,
     jobs: BTreeMap<String, Job>,
 }
 
-/// A script of a dependency runs when it is compiled, and could send the key away or sign something else.
 #[test]
-fn job_with_a_secret_compiles_nothing_and_runs_no_code_of_the_sources() {
-    let [ci, nightly] = WORKFLOWS;
-    assert!(!nightly.contains("secrets."));
-    let Workflow { jobs } = serde_yaml_ng::from_str(ci).unwrap();
-    let mut with_secret = Vec::new();
-    for (name, job) in &jobs {
-        let text = serde_yaml_ng::to_string(&job.steps).unwrap();
-        if job.environment.is_none() && !text.contains("secrets.") {
-            continue;
-        }
-        with_secret.push(name.as_str());
-        for code in ["cargo", "rustup", "checkout", ".ci/", "npm", "pip "] {
-            assert!(!text.contains(code), "{name} has {code}");
-        }
-        for step in &job.steps {
-            let uses = step.get("uses").and_then(|uses| uses.as_str());
-            let moves = |uses: &str| {
-                uses.starts_with("actions/download-artifact@")
-                    || uses.starts_with("actions/upload-artifact@")
-            };
-            assert!(uses.is_none_or(moves), "{name}: {uses:?}");
+fn these_are_all_workflows_and_none_runs_for_a_stranger_with_rights() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../.github/workflows");
+    let mut names: Vec<_> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|file| file.unwrap().file_name())
+        .collect();
+    names.sort_unstable();
+    assert_eq!(names, ["ci.yml", "nightly.yml"]);
+    let allowed = ["push", "pull_request", "workflow_dispatch", "schedule"];
+    for workflow in WORKFLOWS {
+        let Workflow { on, .. } = serde_yaml_ng::from_str(workflow).unwrap();
+        for event in on.as_mapping().unwrap().keys() {
+            assert!(allowed.contains(&event.as_str().unwrap()), "{event:?}");
         }
     }
-    assert_eq!(with_secret, ["sign"]);
+}
+
+/// A script of a dependency runs when it is compiled, and could send the key away or have something else signed. So the
+/// job with the key is exactly this one, and no other names a secret.
+#[test]
+fn job_with_the_key_has_neither_sources_nor_tools_and_runs_for_tags_that_passed_everything() {
+    let words = WORKFLOWS.map(|workflow| workflow.matches("secrets").count());
+    assert_eq!(words, [1, 0], "the word stands once, in the job that signs");
+    let all: Value = serde_yaml_ng::from_str(WORKFLOWS[0]).unwrap();
+    let mut job = all["jobs"]["sign"].as_mapping().unwrap().clone();
+    let Some(Value::Sequence(steps)) = job.remove("steps") else {
+        panic!("sign has no steps");
+    };
+    let rest: Value = serde_yaml_ng::from_str(
+        "
+        name: Signatures of a release
+        needs: [all, files, rebuild]
+        if: >-
+          github.ref_type == 'tag' && !cancelled() && needs.all.result == 'success' && needs.files.result == 'success'
+          && needs.rebuild.result == 'success'
+        runs-on: ubuntu-24.04
+        timeout-minutes: 10
+        environment: release
+        permissions: {}
+        ",
+    )
+    .unwrap();
+    assert_eq!(Value::Mapping(job), rest);
+    let [download, sign, upload] = &steps[..] else {
+        panic!("sign has {} steps", steps.len());
+    };
+    for (step, action) in [(download, "download"), (upload, "upload")] {
+        let uses = step["uses"].as_str().unwrap();
+        assert!(
+            uses.starts_with(&format!("actions/{action}-artifact@")),
+            "{uses}"
+        );
+        assert!(step.get("env").is_none(), "{step:?}");
+    }
+    assert_eq!(
+        sign["env"]["MODIO_SIGNING_KEY"],
+        "${{ secrets.MODIO_SIGNING_KEY }}"
+    );
+    // It runs nothing but these, so no file of the artifact.
+    let commands = [
+        "set",
+        "export",
+        "umask",
+        "mkdir",
+        "cd",
+        "diff",
+        "sha256sum",
+        "field()",
+        "for",
+        "echo",
+        "test",
+        "openssl",
+        "-out",
+        "done",
+        "#",
+    ];
+    for line in script().lines() {
+        let first = line.split_whitespace().next().unwrap();
+        assert!(commands.contains(&first), "{line}");
+    }
 }
 
 /// Returns the script of the job that signs.
 fn script() -> String {
-    let Workflow { jobs } = serde_yaml_ng::from_str(WORKFLOWS[0]).unwrap();
+    let Workflow { jobs, .. } = serde_yaml_ng::from_str(WORKFLOWS[0]).unwrap();
     let scripts = jobs["sign"].steps.iter().filter_map(|step| step.get("run"));
     let scripts: Vec<_> = scripts.filter_map(|script| script.as_str()).collect();
     assert_eq!(scripts.len(), 1);
     scripts[0].to_owned()
 }
 
-/// Runs the script in a directory with these bytes to be signed. Returns the signature.
-fn signed(part: &[u8], sums: Option<&str>, key: &str) -> Option<Vec<u8>> {
-    let directory = tempfile::tempdir().unwrap();
-    let unsigned = directory.path().join("unsigned");
-    let write = |name: &str, bytes: &[u8]| std::fs::write(unsigned.join(name), bytes).unwrap();
-    std::fs::create_dir(&unsigned).unwrap();
-    write("modio-02-a.tbs", part);
-    let listed = Command::new("sha256sum")
-        .arg("modio-02-a.tbs")
-        .current_dir(&unsigned)
-        .output();
-    let listed = String::from_utf8(listed.unwrap().stdout).unwrap();
-    write("SHA256SUMS", listed.as_bytes());
-    let mut bash = Command::new("bash");
-    bash.args(["-c", &script()]).current_dir(directory.path());
-    bash.env("SUMS", sums.unwrap_or(listed.trim_end()));
-    bash.env("EPOCH", "3").env("MODIO_SIGNING_KEY", key);
-    let done = bash.output().unwrap();
-    let signature = std::fs::read(directory.path().join("signatures/modio-02-a.sig"));
-    signature.ok().filter(|_| done.status.success())
-}
+/// With the programs of the machine that signs: other systems have others.
+#[cfg(target_os = "linux")]
+mod signing {
+    use std::process::Command;
 
-/// The 92 bytes of a header of epoch 3.
-fn part() -> Vec<u8> {
-    let mut part: Vec<u8> = (0..92).map(|n| n as u8).collect();
-    part[..8].copy_from_slice(b"MODI\x02\x01\x03\0");
-    part
-}
+    use ed25519_dalek::{Signer as _, SigningKey};
 
-#[cfg(unix)]
-#[test]
-fn workflow_signs_as_xtask_does_and_refuses_what_is_not_expected() {
-    let directory = tempfile::tempdir().unwrap();
-    let path = directory.path().join("key");
-    crate::keys::generate(&path).unwrap();
-    let pem = std::fs::read_to_string(&path).unwrap();
-    let key: SigningKey = crate::keys::private(&pem).unwrap();
-    let right = part();
-    let signature = signed(&right, None, &pem).expect("openssl signs");
-    assert_eq!(signature, key.sign(&right).to_bytes());
-    let changed = |at: usize| {
-        let mut part = part();
-        part[at] ^= 1;
-        part
-    };
-    for (what, part, sums) in [
-        ("another magic number", changed(0), None),
-        ("another version of the header", changed(4), None),
-        ("another epoch", changed(6), None),
-        ("another length", part()[..91].to_vec(), None),
-        ("other check sums", part(), Some("0000  modio-02-a.tbs")),
-    ] {
-        assert_eq!(signed(&part, sums, &pem), None, "{what}");
+    use super::*;
+
+    /// Runs the script in a directory with these bytes to be signed, and with a file that is in no list. Returns the
+    /// signature.
+    fn signed(part: &[u8], sums: Option<&str>, other: Option<&str>, key: &str) -> Option<Vec<u8>> {
+        let directory = tempfile::tempdir().unwrap();
+        let unsigned = directory.path().join("unsigned");
+        let write = |name: &str, bytes: &[u8]| std::fs::write(unsigned.join(name), bytes).unwrap();
+        std::fs::create_dir(&unsigned).unwrap();
+        write("modio-02-a.tbs", part);
+        let listed = Command::new("sha256sum")
+            .arg("modio-02-a.tbs")
+            .current_dir(&unsigned)
+            .output();
+        let listed = String::from_utf8(listed.unwrap().stdout).unwrap();
+        write("SHA256SUMS", listed.as_bytes());
+        if let Some(other) = other {
+            write(other, part);
+        }
+        let mut bash = Command::new("bash");
+        bash.args(["-c", &script()]).current_dir(directory.path());
+        bash.env("SUMS", sums.unwrap_or(listed.trim_end()));
+        bash.env("EPOCH", "3").env("MODIO_SIGNING_KEY", key);
+        let done = bash.output().unwrap();
+        let signature = std::fs::read(directory.path().join("signatures/modio-02-a.sig"));
+        signature.ok().filter(|_| done.status.success())
     }
-    assert!(!Path::new("signatures").exists());
+
+    /// The 92 bytes of a header of epoch 3.
+    fn part() -> Vec<u8> {
+        let mut part: Vec<u8> = (0..92).map(|n| n as u8).collect();
+        part[..8].copy_from_slice(b"MODI\x02\x01\x03\0");
+        part
+    }
+
+    #[test]
+    fn workflow_signs_as_xtask_does_and_refuses_what_is_not_expected() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("key");
+        crate::keys::generate(&path).unwrap();
+        let pem = std::fs::read_to_string(&path).unwrap();
+        let key: SigningKey = crate::keys::private(&pem).unwrap();
+        let right = part();
+        let signature = signed(&right, None, None, &pem).expect("openssl signs");
+        assert_eq!(signature, key.sign(&right).to_bytes());
+        let changed = |at: usize| {
+            let mut part = part();
+            part[at] ^= 1;
+            part
+        };
+        for (what, part, sums, other) in [
+            ("another magic number", changed(0), None, None),
+            ("another version of the header", changed(4), None, None),
+            ("another epoch", changed(6), None, None),
+            ("another length", part()[..91].to_vec(), None, None),
+            (
+                "other check sums",
+                part(),
+                Some("0000  modio-02-a.tbs"),
+                None,
+            ),
+            ("a file in no list", part(), None, Some("modio-02-b.tbs")),
+        ] {
+            assert_eq!(signed(&part, sums, other, &pem), None, "{what}");
+        }
+    }
 }

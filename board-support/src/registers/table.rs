@@ -95,8 +95,8 @@ const fn line_modes(register: u32) -> Block {
     }
 }
 
-/// Returns the mask of the line's pins in a configuration register. Where they have none, a wrong mode is written as that
-/// of any other pin.
+/// Returns the mask of the line's pins in a configuration register. `None` when no pin of the line is in the register, or
+/// when the bits do not fit a mask of 16 bits. In the second case [`modes`] repairs these pins with the others.
 const fn line_mask(register: u32) -> Option<i16> {
     let bits = BOARD.line.mode_bits(register);
     let mask = bits as i16;

@@ -251,11 +251,16 @@ impl<const SLOTS: usize> Config<SLOTS> {
     ///
     /// # Errors
     ///
-    /// The first that applies: 02 for a gap, or for a MODULE that is part of the board; 03 for a value that is not allowed, including a setting by point that
-    /// the module chosen last does not allow, and a FORMAT with seven data bits in RTU mode; 06 for a broadcast over
-    /// the air or a line that may not write here, when the lock is closed for the line and the request does not write
-    /// KEY alone, or when a save is ordered before the previous one is complete or with nothing left of the budget.
-    /// HEARTBEAT alone is always allowed.
+    /// The first of these exceptions that applies:
+    ///
+    /// - 02: the registers have a gap, or a MODULE belongs to a port that is part of the board.
+    /// - 03: a value is not allowed. This includes a setting by point that does not suit the module written last, and a
+    ///   FORMAT with seven data bits in RTU mode.
+    /// - 06: the request is a broadcast over the air, or its line may not write the configuration.
+    /// - 06: the lock is closed for this line, and the request does not write KEY alone.
+    /// - 06: the request orders a save while another save runs, or while no save is left in the budget.
+    ///
+    /// A write of HEARTBEAT alone is always allowed.
     pub fn check_write(&self, span: Span, words: Words<'_>) -> Result<(), Exception> {
         if span == HEARTBEAT_ALONE {
             return Ok(());
@@ -500,15 +505,18 @@ impl<const SLOTS: usize> Config<SLOTS> {
         self.save = Save::None;
     }
 
-    /// Takes one save from the budget, before the first operation on the flash. Returns the number that is left, to be
-    /// kept over a reset. `None`: there was none, and the save must not be written. The order was accepted because it
-    /// changed no setting, but the other line has changed one since, or the stored record is not what would be written.
+    /// Takes one save from the budget, before the first operation on the flash. Returns the number of saves left, which
+    /// the caller keeps over a reset.
+    ///
+    /// Returns `None` when the budget is empty; the caller must not write the flash then. The order for this save was
+    /// accepted because no setting differed from the stored ones. Since then the other line has changed a setting, or the
+    /// stored record has turned out to differ.
     #[must_use]
     pub fn take_save(&mut self) -> Option<u8> {
         self.saves.take().then(|| self.saves.left())
     }
 
-    /// Returns the number of saves in the budget, to be kept over a reset.
+    /// Returns the number of saves in the budget, which the caller keeps over a reset.
     #[must_use]
     pub const fn saves_left(&self) -> u8 {
         self.saves.left()

@@ -125,7 +125,7 @@ fn copy(bytes: &[u8], at: usize, out: &mut slice::IterMut<'_, u8>) {
     }
 }
 
-/// Returns the end of the document: number of each port, how many channels it lacks, and module.
+/// Returns the end of the document: for each port its number, the number of missing channels, and the module.
 #[inline(never)]
 fn ports<const SLOTS: usize>(config: &Config<SLOTS>) -> [[u8; PORT_BYTES]; SLOTS] {
     let (first, modules) = (config.board().first_port, config.modules());

@@ -1,4 +1,4 @@
-//! The events of function 70: what has changed and is to be reported.
+//! The events of function 70: the changes that wait to be reported.
 //!
 //! Edges of digital inputs wait in order. For outputs and words only the last value is reported, so a mark is enough for
 //! each. What a master switches on is not stored: it is off after a start.

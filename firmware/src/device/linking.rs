@@ -7,8 +7,8 @@ use super::{Device, IoPort};
 use crate::links::{AFTER_POWER_ON_MS, OF_A_SLOT, Outputs, Source, Sources};
 use crate::{HAS_EVENTS, HAS_SLOTS};
 
-/// The board can have analog inputs. Without them nothing of what judges their codes is in the image: the eth-io5r has
-/// relays and digital inputs only, and no room for it.
+/// Whether the board can have analog inputs. If not, the image does not contain the code that judges their codes. The
+/// eth-io5r has only relays and digital inputs, and no room for this code.
 const HAS_ANALOG: bool = HAS_SLOTS || HAS_EVENTS;
 
 /// The links of a device with `SLOTS` slots, while they run.
@@ -16,11 +16,11 @@ const HAS_ANALOG: bool = HAS_SLOTS || HAS_EVENTS;
 pub(super) struct Linking<const SLOTS: usize> {
     outputs: [Outputs; SLOTS],
     sources: [Sources; SLOTS],
-    /// The communication watchdog has expired, as the scan under way has found it.
+    /// Whether the communication watchdog has expired, as read at the beginning of the scan under way.
     alone: bool,
-    /// A second of the uptime has begun with this scan: words are compared with the thresholds.
+    /// Whether a second of the uptime has begun with this scan. Words are compared with the thresholds only then.
     look: bool,
-    /// There are links that hold their output until a master writes it.
+    /// Whether a link holds its output until a master writes the output.
     holding: bool,
 }
 
@@ -45,20 +45,20 @@ impl<const SLOTS: usize> Linking<SLOTS> {
         self.outputs.get(slot).map_or(0, Outputs::with_any_level)
     }
 
-    /// Returns the outputs of a slot that are to have after a reset what they have now, channel 1 in bit 0.
+    /// Returns the outputs of a slot that keep their present value over a reset, channel 1 in bit 0.
     pub fn to_keep(&self, slot: usize) -> u8 {
         self.outputs.get(slot).map_or(0, Outputs::to_keep)
     }
 
-    /// Returns the outputs of a slot that a link holds or will hold that always acts, channel 1 in bit 0.
+    /// Returns the outputs of a slot that are held, or will be held, by a link that always acts, channel 1 in bit 0.
     pub fn held_always(&self, slot: usize) -> u8 {
         self.outputs.get(slot).map_or(0, Outputs::held_always)
     }
 }
 
 impl<const SLOTS: usize> Device<SLOTS> {
-    /// Begins with sources that have no values yet, and with outputs that may have been held before the reset: those of
-    /// each slot that `held` returns, channel 1 in bit 0.
+    /// Prepares the links at a start. The sources have no values yet. `held` returns the outputs of a slot that links
+    /// held before the reset, channel 1 in bit 0.
     pub(super) fn begin_links(&mut self, held: impl Fn(usize) -> u8) {
         if !links::exist(SLOTS) {
             return;
@@ -155,8 +155,8 @@ impl<const SLOTS: usize> Device<SLOTS> {
         }
     }
 
-    /// Stores the inputs of a scan of a slot as sources, `ms` milliseconds after the one before: the codes of its lines, and
-    /// the digital inputs that have changed, channel 1 in bit 0.
+    /// Stores the inputs of a slot as sources after a scan: the codes of the lines, and the digital inputs that have
+    /// changed, channel 1 in bit 0. `ms` is the time since the previous scan in milliseconds.
     pub(super) fn scanned_sources(&mut self, slot: usize, codes: &Codes, changed: u8, ms: u32) {
         if links::exist(SLOTS)
             && let Some(port) = self.points.ports().get(slot)
@@ -282,7 +282,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
     }
 }
 
-/// Makes a source begin again, after a power-on or a change of its settings, or after any other reset.
+/// Starts the wait of a source until it has a value: after a reset, or after a change of the source's settings.
 fn begin_source(sources: &mut Sources, port: &IoPort, channel: usize, long: bool) {
     let is_digital = port.kind(channel) == Kind::BitInput;
     let debounce = port.setting(channel).filter(|_| is_digital);
@@ -295,7 +295,7 @@ fn begin_source(sources: &mut Sources, port: &IoPort, channel: usize, long: bool
     sources.begin(channel, wait + debounce);
 }
 
-/// Returns what a channel is for a level link.
+/// Returns the level, the word or the missing value of a channel, for a level link.
 fn source(port: &IoPort, sources: &Sources, channel: usize) -> Source {
     let channels = port.channels();
     if !sources.has_value(channel) {

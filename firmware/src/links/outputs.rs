@@ -1,7 +1,7 @@
 //! The links to the outputs of one slot, while they run.
 //!
-//! A link that follows or inverts its source, a *level link*, holds its output: while one acts and each acting one knows
-//! what it wants, the output is the *or* of that. The other links act at edges only.
+//! A link that follows or inverts its source is a *level link*. Level links hold their output: while at least one acts,
+//! and each acting one has decided on or off, the output is the *or* of these decisions. The other links act at edges only.
 //!
 //! Masks of links have a bit for each of the slot's links: the first links of the four outputs, then the second ones.
 //! Masks of outputs have channel 1 in bit 0.
@@ -14,19 +14,19 @@ pub const AFTER_A_WRITE_MS: u16 = 1_000;
 /// Number of outputs, which is the distance of the two links of an output.
 const OUTPUTS: usize = OF_A_SLOT / 2;
 
-/// What a source is for a level link.
+/// What a level link reads from its source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Source {
-    /// It has no value. `good`: it will have one after its wait.
+    /// The source has no value.
     NoValue {
-        /// It is good.
+        /// Whether the source is good: it will have a value after its wait.
         good: bool,
     },
     /// The level of a digital input.
     Bit(bool),
     /// The word of an analog input.
     Word(u16),
-    /// An analog input whose value is uncertain: a link keeps what it wanted.
+    /// An analog input whose value is uncertain: a link keeps its last decision.
     Uncertain,
 }
 
@@ -39,15 +39,15 @@ pub(crate) struct Outputs {
     edges: u8,
     /// Links that act only while the communication watchdog has expired.
     alone: u8,
-    /// Links that want something.
+    /// Links that have decided whether their output is on or off.
     known: u8,
-    /// Links that want the output on.
+    /// Of these, the links whose output is on.
     want: u8,
-    /// Links whose source is not good and that never wanted anything, with SAFE = hold: they take no part.
+    /// Links with SAFE = hold whose source is not good and that have never decided: they take no part.
     absent: u8,
-    /// What a link wants between its thresholds when it wanted nothing before.
+    /// Decision of a link for a word between its thresholds, as long as the link has not decided before.
     first: u8,
-    /// Level links of `alone` that hold although the watchdog has not expired any more: until a master writes.
+    /// Links of `alone` that act: from the expiry of the watchdog until a master writes their output.
     holding: u8,
     /// Time in ms until a link acts.
     rests: [u16; OF_A_SLOT],
@@ -57,7 +57,7 @@ pub(crate) struct Outputs {
     held: u8,
     /// Outputs that are held on.
     on: u8,
-    /// Outputs that were held, and whose links do not know yet whether they still are.
+    /// Outputs that links held before the start and that no link has decided about yet.
     kept: u8,
 }
 
@@ -112,7 +112,7 @@ impl Outputs {
         }
     }
 
-    /// Makes links begin again that were written.
+    /// Restarts the links that a request has written.
     pub fn written(&mut self, links: u8) {
         self.forget(links, 0);
         self.holding &= !links;
@@ -124,8 +124,8 @@ impl Outputs {
         }
     }
 
-    /// Makes links forget what they wanted, because the settings of their source have changed, or at a start. Between the
-    /// thresholds they want what the outputs have now, which `on` says.
+    /// Clears the decisions of links, at a start or after a change of the settings of their source. Until a word leaves
+    /// the range between the thresholds, such a link keeps the present value of its output, which `on` has.
     pub const fn forget(&mut self, links: u8, on: u8) {
         self.known &= !links;
         self.absent &= !links;
@@ -152,13 +152,13 @@ impl Outputs {
         }
     }
 
-    /// Returns whether a link holds, or would, until a master writes its output.
+    /// Returns whether a link acts until a master writes its output.
     #[must_use]
     pub const fn is_holding(&self) -> bool {
         self.holding != 0
     }
 
-    /// Ends the hold of links that act only while there is no master: a master has written these outputs.
+    /// Ends the hold of links that act only while there is no master. Called when a master has written these outputs.
     pub const fn end_hold(&mut self, outputs: u8) {
         self.holding &= !of_both(outputs);
     }
@@ -187,8 +187,8 @@ impl Outputs {
         self.edges & !self.resting & !resting & !of_both(self.held)
     }
 
-    /// Looks at the source of a level link. `safe` is SAFE of its output, `None` for hold. `look`: a word is compared with
-    /// the thresholds even if the link knows what it wants.
+    /// Reads the source of a level link. `safe` is SAFE of its output, `None` for hold. `look`: a word is compared with the
+    /// thresholds even if the link has decided before.
     pub fn look(
         &mut self,
         index: usize,
@@ -249,14 +249,14 @@ impl Outputs {
         self.on
     }
 
-    /// Returns the outputs that a link holds that always acts, or will hold once it acts and knows what it wants.
+    /// Returns the outputs with a level link that always acts. Such a link holds its output once it has decided.
     #[must_use]
     pub const fn held_always(&self) -> u8 {
         of_outputs(self.levels & !self.alone & !self.absent)
     }
 
-    /// Returns the outputs that are to have after a reset what they have now, because a link holds them, or did so before
-    /// the start and does not know yet.
+    /// Returns the outputs that keep their present value over a reset: a link holds them, or a link held them before the
+    /// start and has not decided yet.
     #[must_use]
     pub const fn to_keep(&self) -> u8 {
         self.kept

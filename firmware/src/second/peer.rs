@@ -6,19 +6,19 @@ use modio_drivers::Lora;
 
 /// What is at the UART of the second line. Bytes are read and written only when it is ready.
 pub trait Peer: Read<u8> + Write<u8> {
-    /// It is a radio, which can fail, and which receives a frame with pauses inside.
+    /// Whether the peer is a radio. A radio can fail, and it delivers a frame with pauses inside.
     const IS_RADIO: bool;
 
-    /// Continues its set-up, `passed` milliseconds after the last call.
+    /// Continues the set-up of the peer, `passed` milliseconds after the last call.
     fn poll(&mut self, passed: u16);
 
-    /// Returns whether it is set up.
+    /// Returns whether the peer is set up.
     fn is_ready(&self) -> bool;
 
-    /// Returns whether the last attempt to set it up has failed.
+    /// Returns whether the last attempt to set up the peer has failed.
     fn has_failed(&self) -> bool;
 
-    /// Returns whether it neither sends nor receives, as far as it shows that.
+    /// Returns whether the peer neither sends nor receives. An RS-232 socket has no pin that shows this: always true.
     fn is_free(&mut self) -> bool;
 }
 

@@ -7,9 +7,8 @@
 //!            (background)    (serve)    (background)           (background)
 //! ```
 //!
-//! A request only notes what is to be done. The background task does it, one step at a time ([`Job`]), so the device
-//! serves its points during an update. A block is in RAM until it is programmed, which takes up to 5 ms, and there is room for
-//! two.
+//! A request only notes the [`Job`]. The background task does it, one step at a time, so the device serves its points
+//! during an update. A block is in RAM until it is programmed, which takes up to 5 ms. There is room for two blocks.
 
 mod missing;
 mod work;

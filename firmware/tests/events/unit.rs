@@ -106,7 +106,7 @@ impl Unit {
         self.edges.push_back((at, input, level));
     }
 
-    /// Passes the edges up to `at` to the device, each with a scan of its own, as after the debounce.
+    /// Passes the edges up to `at` to the device, each in a separate scan, as after the debounce.
     fn catch_up(&mut self, at: f64) {
         while let Some((time, input, level)) = self.edges.front().copied().filter(|e| e.0 <= at) {
             self.edges.pop_front();

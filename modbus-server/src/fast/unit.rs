@@ -18,10 +18,10 @@ const NO_EVENTS: u32 = 0b1111 << 8;
 const ADDRESS_BITS: u8 = 8;
 /// Number of packets in a row after which others go first.
 const IN_A_ROW: u8 = 2;
-/// Number of packets in a row after which a unit that is the least one asked says once that there are no events. Some
-/// masters begin again with the least address only when they hear that.
+/// Number of packets in a row after which a unit reports once that there are no events, if the request starts at its
+/// address. Some masters begin again with the lowest address only when they receive that report.
 const BEFORE_NONE: u8 = 4;
-/// Number of confirmed packets in a row with the start, after which the master knows of it.
+/// Number of confirmed packets in a row that contain the event *start*. After them the master knows of the start.
 const STARTS: u8 = 2;
 /// Largest number of words that function 17 can return inside sub-function 09: 256 bytes less 7 in front, 2 of function
 /// and byte count, and 2 of the CRC are 245.
@@ -32,7 +32,7 @@ const MAX_WORDS: u16 = 122;
 pub enum Part {
     /// Scans, requests by serial number, and events.
     Everything,
-    /// Scans and requests by serial number: the unit has no address of its own.
+    /// Scans and requests by serial number: the unit has no unit address.
     NoEvents,
     /// Scans only.
     Scans,
@@ -54,7 +54,7 @@ pub struct Unit {
     /// Number of packets with the start that were confirmed in a row.
     starts: u8,
     packet: Packet,
-    /// What the reply means that was sent if the unit has won.
+    /// What winning the last arbitration means for this unit.
     contended: Contended,
 }
 
@@ -132,7 +132,7 @@ impl Unit {
     pub fn close(&self, reply: &mut Reply<'_>) {
         let adu = &mut *reply.adu;
         if !adu.add_front(SERIAL_AHEAD) {
-            // It has read something: all other replies are no longer than their requests.
+            // Only the reply to a read can be too long: all other replies are no longer than their requests.
             reply.outcome = refuse(adu, Exception::IllegalDataValue.into());
             adu.add_front(SERIAL_AHEAD);
         }
@@ -144,15 +144,16 @@ impl Unit {
 
     /// Notes how the unit's last arbitration has ended.
     ///
-    /// A unit that lets others go first does so until it wins, or loses to a unit that does the same: by their addresses.
-    /// Then nobody else has events. So of several units with more and more events each has its turn.
+    /// A unit that lets others go first does so until it wins, or until it loses to a unit that also lets others go first;
+    /// the addresses decide between these two. No other unit has events then. So each of several units with a steady flow
+    /// of events has its turn.
     fn end_contest(&mut self, ending: Ending) {
         let contended = core::mem::replace(&mut self.contended, Contended::Nothing);
         let yields = self.in_a_row >= IN_A_ROW;
         match (contended, ending) {
             (Contended::ToBeFound, Ending::Won) => self.is_found = true,
             (Contended::Packet, Ending::Won) => {
-                // One without room for any event is made again.
+                // A packet that had no room for any event is made again.
                 self.packet.was_sent = !self.packet.is_empty();
                 self.since_none = self.since_none.saturating_add(1);
                 self.in_a_row = if yields { 1 } else { self.in_a_row + 1 };
@@ -167,7 +168,7 @@ impl Unit {
         }
     }
 
-    /// Makes a request to start or to continue a scan the reply.
+    /// Replaces a request to start or to continue a scan with the reply.
     fn scan(&mut self, adu: &mut Adu) -> Contest {
         let mark = if self.is_found {
             adu.set(2, sub::NONE_LEFT);
@@ -185,7 +186,7 @@ impl Unit {
         }
     }
 
-    /// Makes a request for events the reply. Returns `None` if the unit is not asked.
+    /// Replaces a request for events with the reply. Returns `None` if the request excludes this unit's address.
     fn fetch(&mut self, adu: &mut Adu, source: &mut impl EventSource) -> Option<Contest> {
         let (least, room, confirmed, flag) = (adu.get(3), adu.get(4), adu.get(5), adu.get(6));
         if self.packet.was_sent && !self.packet.was_taken {
@@ -237,11 +238,11 @@ impl Unit {
         }
         let own = self.packet.number;
         source.fill(&mut self.packet);
-        // More wait now if edges were lost.
+        // More events wait now if edges were lost.
         self.packet.number = own.saturating_add(source.waiting().count);
     }
 
-    /// The master has the packet.
+    /// Clears the packet, which the master has confirmed.
     fn confirm(&mut self, source: &mut impl EventSource) {
         self.starts = if self.packet.has_start() {
             self.starts + 1
@@ -265,10 +266,10 @@ impl Unit {
 }
 
 impl Server {
-    /// Serves a request to [`ADDRESS`], of the same line, that is not [for the unit alone](Unit::open), and makes its buffer
-    /// the reply. Returns the reply, and with which bits it takes part in the arbitration.
+    /// Serves a request to [`ADDRESS`] for which [`Unit::open`] has returned false, from the line of `unit`. The reply is
+    /// written to the buffer of the request. Returns the reply, and the bits with which the unit sends it in the arbitration.
     ///
-    /// Requests that the unit does not take part in have no reply, as all others that it does not know.
+    /// A request gets no reply when the unit does not know it, or when [`Part`] excludes the unit from it.
     pub fn serve_fast<'a, M: EventSource>(
         &mut self,
         request: Request<'a>,

@@ -32,8 +32,8 @@ impl Faults {
         self.0
     }
 
-    /// Returns whether the character may differ from the one that was sent, or another one was lost: true for every
-    /// fault but [`NOISE`](Self::NOISE).
+    /// Returns whether the received character may be wrong, or another character was lost: true for every fault but
+    /// [`NOISE`](Self::NOISE).
     #[inline]
     pub(super) const fn spoil(self) -> bool {
         self.0 & !Self::NOISE.0 != 0

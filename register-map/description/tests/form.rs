@@ -62,6 +62,22 @@ fn the_file_begins_with_length_and_crc() {
 }
 
 #[test]
+fn pages_name_the_sizes_of_the_files_of_all_boards() {
+    let lengths = Board::ALL.map(|board| {
+        let unit = describe(board, env!("CARGO_PKG_VERSION"), |_| Module::None);
+        unit.file().len()
+    });
+    let kib = |length: Option<&usize>| *length.unwrap() as f64 / 1024.0;
+    let (least, most) = (kib(lengths.iter().min()), kib(lengths.iter().max()));
+    let sizes = format!("{least:.1} to {most:.1} KiB");
+    for page in ["architecture.md", "self-description.md"] {
+        let path = format!("{}/../../docs/{page}", env!("CARGO_MANIFEST_DIR"));
+        let text = std::fs::read_to_string(path).unwrap();
+        assert!(text.contains(&sizes), "{page} needs {sizes:?}: {lengths:?}");
+    }
+}
+
+#[test]
 fn a_damaged_or_short_file_is_rejected() {
     let file = unit(Module::Ai4).file();
     let length = u16::from_be_bytes([file[0], file[1]]);

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use std::str::FromStr;
 use std::time::Duration;
 
-/// Rates in bit/s that the tests and the simulator support. The type is the one that clap takes for a range.
+/// Rates in bit/s that the tests and the simulator support. clap takes a range of this type.
 pub const RATES: RangeInclusive<i64> = 300..=4_000_000;
 
 /// Parity of a character.

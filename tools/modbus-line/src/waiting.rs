@@ -100,6 +100,8 @@ impl Waiting<'_> {
                     counted(bytes.sum())
                 }
                 0x05 | 0x06 | 0x16 => response == self.pdu,
+                // Returns the data of the request.
+                0x08 if self.pdu.get(1..3) == Some(&[0, 0]) => response == self.pdu,
                 0x0F | 0x10 => Some(response) == self.pdu.get(..5),
                 _ => true,
             }
@@ -152,6 +154,9 @@ mod tests {
         let write = waiting(Framing::Rtu, &[6, 1, 0, 0x5A, 0x17]);
         let other = Framing::Rtu.frame(0, 1, &[6, 1, 0, 0x5A, 0x18]);
         assert_eq!(write.find(&other), None);
+        let data = waiting(Framing::Rtu, &[8, 0, 0, 0x12, 0x34]);
+        let other = Framing::Rtu.frame(0, 1, &[8, 0, 0, 0x12, 0x33]);
+        assert_eq!(data.find(&other), None, "the data of another 08/00");
         let late = Framing::Mbap.frame(8, 1, &[3, 2, 0, 5]);
         assert_eq!(waiting(Framing::Mbap, READ).find(&late), None);
         let then = [late, Framing::Mbap.frame(9, 1, &[3, 2, 0, 5])].concat();

@@ -19,8 +19,8 @@ pub use fast::{Address, Events, High};
 #[derive(Parser, Debug)]
 #[command(name = "modioctl", version, max_term_width = 100)]
 #[command(after_help = "\
-Exit status: 0 done; 1 the unit refused; 2 wrong usage; 3 no answer; 4 garbled answers; 5 the port cannot be opened; \
-130 stopped with Ctrl-C.
+Exit status: 0 done; 1 the unit refused; 2 wrong usage; 3 no answer (also 0A and 0B of a gateway); 4 garbled answers; \
+5 the port cannot be opened; 130 stopped with Ctrl-C.
 
 Options of the endpoint may also stand in the environment (MODIO_PORT, MODIO_BAUD, ...), or under a name in a file:
 `--at office` takes those of [office] in endpoints.toml, where the system keeps settings (Linux: ~/.config/modio/).")]
@@ -411,8 +411,9 @@ pub struct Update {
     /// Send the blocks to each unit alone
     #[arg(long, conflicts_with_all = ["status", "back"])]
     pub unicast: bool,
-    /// Send the firmware to units that already run it as well
-    #[arg(long, conflicts_with_all = ["status", "back"])]
+    /// Also send the firmware to units that run it already, and update units whose settings are not saved, which the
+    /// restart loses
+    #[arg(long, conflicts_with = "status")]
     pub force: bool,
     /// Let firmware that is signed with the second key of the units end their first key, for good
     #[arg(long, conflicts_with_all = ["status", "back"])]

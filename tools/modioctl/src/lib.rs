@@ -22,6 +22,7 @@ mod device;
 pub mod export;
 pub mod failure;
 mod held;
+mod input;
 mod links;
 mod listing;
 mod monitor;

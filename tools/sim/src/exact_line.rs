@@ -340,8 +340,8 @@ mod tests {
             ("line 100 8N2", "300 to 4000000"),
             ("line 9600 7N1", "\"7N1\""),
         ] {
-            let told = ask(&mut board, line).unwrap_err();
-            assert!(told.contains(reason), "{line}: {told}");
+            let error = ask(&mut board, line).unwrap_err();
+            assert!(error.contains(reason), "{line}: {error}");
         }
         assert_eq!(board.now(), before);
         assert_eq!(board.line().master_free(), before, "nothing is queued");

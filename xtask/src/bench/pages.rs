@@ -4,6 +4,8 @@
 use std::path::Path;
 
 use fs_err as fs;
+use register_map::board::{MODIO_02, MODIO_08};
+use register_map::part::{FLASH_BASE, RAM_BASE};
 use serde_json::Value;
 
 fn read(path: &str) -> String {
@@ -74,12 +76,21 @@ fn picture_of_a_request_has_the_figures_of_the_baseline() {
 
 #[test]
 fn picture_of_the_memory_has_the_sizes_of_the_baselines() {
-    let flash = |board| Baseline::of(board).figure("image", "flash");
-    let text = |board| format!(">{} bytes<", thousands(flash(board)));
-    check(
-        "docs/images/memory.svg",
-        &[text("modio-02"), text("modio-08")],
-    );
+    for board in [&MODIO_02, &MODIO_08] {
+        let bench = Baseline::of(board.name);
+        let [flash, ram] = ["flash", "ram"].map(|key| bench.figure("image", key));
+        let end = u64::from(FLASH_BASE) + flash;
+        // The stack is not counted. What a reset keeps is counted, and lies at the end of the RAM.
+        let variables = u64::from(RAM_BASE + board.memory().stack) + ram - 512;
+        check(
+            "docs/images/memory.svg",
+            &[
+                format!(">{} bytes<", thousands(flash)),
+                format!(">0x{end:08X}<"),
+                format!(">0x{variables:08X}<"),
+            ],
+        );
+    }
 }
 
 #[test]

@@ -10,7 +10,7 @@ use register_map::{Board, update::Slot};
 
 use super::notices::Notices;
 use super::paths::Paths;
-use super::{Signer, sbom, sha256};
+use super::{Signer, sbom, sha256, signing};
 use crate::build::{self, Program};
 use crate::image::{self, Elf};
 use crate::sources::Sources;
@@ -31,7 +31,7 @@ pub struct Files<'a> {
 impl Files<'_> {
     /// Makes the files: the image that runs alone, the loader, the application for both slots, and what is signed. Without
     /// a signer those are the images and the bytes to be signed.
-    pub fn make(&mut self, signer: &Signer) -> Result<()> {
+    pub fn make(&mut self, signer: &Signer<'_>) -> Result<()> {
         let board = self.board;
         let (alone, entry) = self.program(Program::Alone, board.name)?;
         self.write(
@@ -51,11 +51,14 @@ impl Files<'_> {
                     self.write(&format!("{name}.image"), &image)?;
                 }
                 Signer::Key(key) => signed::sign(&mut image, key),
-                Signer::Signed(directory, public) => {
+                Signer::Signed(directory, pair) => {
                     let file = directory.join(format!("{board}.modio"));
                     let images = signed::images(&fs::read(&file)?);
                     let signed = images.and_then(|images| {
-                        signed::sign_as(&mut image, &images[slot as usize], public)
+                        let of_release = &images[slot as usize];
+                        signing::check(of_release, board, slot, self.sources)?;
+                        let signature = signed::signature(of_release);
+                        signed::put_signature(&mut image, signature, pair.keys()).map(drop)
                     });
                     signed.with_context(|| file.display().to_string())?;
                 }

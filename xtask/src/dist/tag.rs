@@ -8,14 +8,23 @@ use anyhow::Result;
 
 use crate::command;
 use crate::error::usage;
+use crate::keys::PRODUCTION;
 use crate::sources::{self, Sources};
 
-/// Refuses sources that no commit has.
-pub fn check_commit(sources: &Sources) -> Result<()> {
+/// Refuses sources that no commit has, and public keys of releases that it has not.
+pub fn check_commit(root: &Path, sources: &Sources) -> Result<()> {
     let commit = &sources.commit;
     if commit.ends_with("-dirty") || commit == "unknown" {
         return Err(usage(format!(
             "the commit of these sources is {commit}; a release needs a commit without changes"
+        )));
+    }
+    let mut git = Command::new("git");
+    git.current_dir(root);
+    let tracked = git.args(["ls-files", "--error-unmatch", PRODUCTION]);
+    if root.join(PRODUCTION).exists() && command::read(tracked).is_err() {
+        return Err(usage(format!(
+            "{PRODUCTION} is in no commit, so nobody could build these files again: git add and commit it"
         )));
     }
     Ok(())
@@ -53,30 +62,25 @@ pub fn check(root: &Path, tag: &str, sources: &Sources, jump: bool) -> Result<()
     {
         return Err(usage(format!("the tag {tag} is not at this commit")));
     }
-    let tags = git(&[
-        "tag",
-        "--merged",
-        "HEAD",
-        "--sort=-version:refname",
-        "--list",
-        "v*",
-    ])?;
-    let before = match tags.lines().find(|other| *other != tag) {
+    let tags = git(&["tag", "--merged", "HEAD", "--list", "v*"])?;
+    let epochs = tags.lines().filter(|other| *other != tag).map(|other| {
         // A tag from before the workspace had a version, too, has no epoch.
-        Some(other) => git(&["show", &format!("{other}:Cargo.toml")])
+        git(&["show", &format!("{other}:Cargo.toml")])
             .and_then(|manifest| sources::read(&manifest))
-            .map_or(0, |(_, epoch)| epoch),
-        None => 0,
-    };
+            .map_or(0, |(_, epoch)| epoch)
+    });
+    // The highest, whatever the names of the tags are.
+    let before = epochs.max().unwrap_or_default();
     let epoch = sources.epoch;
     if epoch < before {
         return Err(usage(format!(
-            "epoch {epoch} is below {before}, that of the tag before: no unit would take these images"
+            "epoch {epoch} is below {before}, that of a tag before: no unit would take these images"
         )));
     }
     if epoch > before.saturating_add(1) && !jump {
         return Err(usage(format!(
-            "epoch {epoch} is more than one above {before}, that of the tag before; --epoch-jump says that this is meant"
+            "epoch {epoch} is more than one above {before}, the highest of the tags before; --epoch-jump says that this is \
+             meant"
         )));
     }
     Ok(())
@@ -122,7 +126,7 @@ mod tests {
 
     fn checked(root: &Path, tag: &str, jump: bool) -> Result<(), String> {
         let sources = Sources::of(root).unwrap();
-        check_commit(&sources).map_err(|error| error.to_string())?;
+        check_commit(root, &sources).map_err(|error| error.to_string())?;
         check(root, tag, &sources, jump).map_err(|error| error.to_string())
     }
 
@@ -155,6 +159,11 @@ mod tests {
             .arg(&to);
         command::read(&mut clone).unwrap();
         refused(&to, "v1.2.4", "no history");
+        let public = root.join(PRODUCTION);
+        fs::create_dir_all(public.parent().unwrap()).unwrap();
+        fs::write(&public, "keys").unwrap();
+        refused(root, "v1.2.4", "is in no commit");
+        fs::remove_file(public).unwrap();
         fs::write(
             root.join("Cargo.toml"),
             "[workspace.package]\nversion = \"1.2.4\"\n\n",
@@ -185,6 +194,13 @@ mod tests {
         let jump = of(4, 6);
         refused(jump.path(), "v1.10.0", "more than one above 4");
         assert_eq!(checked(jump.path(), "v1.10.0", true), Ok(()));
+        // A tag with another name, at sources without an epoch, hides nothing.
+        let odd = repository(&[
+            ("1.8.0", 0, Some("verified")),
+            ("1.9.0", 1, Some("v1.9.0")),
+            ("1.10.0", 0, Some("v1.10.0")),
+        ]);
+        refused(odd.path(), "v1.10.0", "below 1");
         let first = repository(&[("1.0.0", 2, Some("v1.0.0"))]);
         refused(first.path(), "v1.0.0", "more than one above 0");
     }

@@ -71,7 +71,7 @@ fn ranges_of_analog_points_are_those_of_the_board() {
 }
 
 #[test]
-fn channels_that_a_port_lacks_are_no_points() {
+fn missing_channels_of_a_port_are_no_points() {
     let settings = Settings::<4>::defaults(&ETH_IO5R);
     let kinds: Vec<_> = ETH_IO5R
         .points()

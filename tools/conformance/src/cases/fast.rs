@@ -46,7 +46,7 @@ fn claimed(bench: &mut Bench<'_>) -> Check {
 fn ask(bench: &mut Bench<'_>, request: &Request) -> Check<Option<Reply>> {
     let (_, wait) = request.longest_wait(bench.endpoint.line());
     let patience = bench.patience;
-    // An arbitration has silences that are longer than the one that ends a reply.
+    // An arbitration has longer silences than the silence that ends a reply.
     bench.patience.reply += wait;
     bench.patience.quiet = bench.patience.quiet.max(wait);
     let received = bench.raw_due(&bench.target.mode.frame(ADDRESS, &request.pdu()));

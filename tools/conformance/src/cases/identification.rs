@@ -82,7 +82,7 @@ fn page(bench: &mut Bench<'_>, code: u8, object: u8) -> Check<Page> {
     })
 }
 
-/// Reads a whole stream from an object on, with as many requests as needed.
+/// Reads the objects from `first` to the end of the stream, with as many requests as needed.
 fn stream(bench: &mut Bench<'_>, code: u8, first: u8) -> Check<Vec<(u8, Vec<u8>)>> {
     let (mut all, mut from) = (Vec::new(), first);
     loop {

@@ -82,7 +82,8 @@ fn set(bench: &mut Bench<'_>, register: u16, value: u16) -> Check {
     bench.reply_is(&request, &request)
 }
 
-/// COMM_TIMEOUT in tenths of a second. Where time is not exact it is longer, so that a busy host does not exceed it.
+/// Returns a value for COMM_TIMEOUT in tenths of a second: `exact` in virtual time. In real time it is four times as long,
+/// so that the pauses of a busy host are not longer than the time-out.
 fn tenths(bench: &Bench<'_>, exact: u16) -> u16 {
     bench.exact(exact, exact * 4)
 }

@@ -401,7 +401,8 @@ impl Unit {
         }
     }
 
-    /// Whether the unit has function 70: in RTU, and not as a modio, which the suite asks for functions that it lacks.
+    /// Returns whether the unit has function 70: only in RTU mode, and not as a modio. This unit does not have all that the
+    /// suite expects of a modio with function 70.
     const fn has_fast(&self) -> bool {
         matches!(self.mode, Mode::Rtu) && self.server.modio.is_none()
     }

@@ -3,22 +3,15 @@
 
 use conformance::endpoint::sim::Fitting;
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
-use register_map::Module;
-use register_map::board::{ETH_IO5R, FX3U_24};
 
-use super::{failed, in_process, line, modio_08, named, of, passed};
+use super::{failed, in_process, line, named, others, passed, with_different_modules};
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn pulses_delay_a_reply_by_a_character_at_most_at_high_rates_on_every_board() {
     let cases = named(&["damage/noise-behind-a-frame"]);
-    let boards = [
-        modio_08([Module::Di4, Module::Do4, Module::Ai4, Module::Ao4]),
-        of(&FX3U_24),
-        of(&ETH_IO5R),
-    ];
     let mut fittings = Vec::new();
-    for board in boards {
+    for board in others().map(with_different_modules) {
         for (baud, format) in [
             (115_200, "8E1"),
             (230_400, "8N1"),

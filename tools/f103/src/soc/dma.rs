@@ -11,7 +11,7 @@ use crate::time::Time;
 /// A channel: the controller and the channel in it, both from 0.
 type Channel = (usize, usize);
 
-/// Blocks that request transfers: the channel that reads the block, and the one that writes it.
+/// Blocks that request transfers: the channel that reads the block, and the channel that writes the block.
 const REQUESTERS: [(Block, [Option<Channel>; 2]); 5] = [
     (Block::Adc1, [Some((0, 0)), None]),
     (Block::Usart1, [Some((0, 4)), Some((0, 3))]),
@@ -69,7 +69,7 @@ impl<C: Circuit> Soc<C> {
         let (address, width) = transfer.peripheral;
         let (place, offset) = map::place(address);
         if place != Place::Block(block) {
-            return Err("a DMA transfer whose peripheral is not the one that requests it");
+            return Err("a DMA transfer with another peripheral than the one of its request");
         }
         let (offset, lane) = (offset & !3, 8 * (offset & 3));
         if transfer.to_peripheral {

@@ -102,7 +102,7 @@ pub struct Packet {
 pub struct Event {
     /// Type, one of [`kind`] or an unknown one.
     pub kind: u8,
-    /// Address of the point, or what has happened.
+    /// Address of the point, or the number of the event of a unit.
     pub id: u16,
     /// The new value, low byte first.
     pub data: Vec<u8>,
@@ -337,7 +337,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_belong_to_the_request_is_not_found() {
+    fn frame_of_another_request_is_not_found() {
         let other = frame(ADDRESS, &[0x46, 9, 0, 1, 0xEB, 0x38, 0x83, 2]);
         assert_eq!(by_serial().find(&other), None, "another serial number");
         let refused = frame(ADDRESS, &[0x46, 9, 0, 1, 0xEB, 0x37, 0x83, 2]);

@@ -22,7 +22,7 @@ impl Master {
     pub async fn broadcast(&mut self, pdu: &[u8], pause: Duration) -> io::Result<()> {
         let free = self.free() + pause;
         self.free_from(free - STEP);
-        self.settle(ALL, pdu).await?;
+        self.settle().await?;
         std::thread::sleep(free.saturating_duration_since(Instant::now()));
         self.put(ALL, pdu).await?;
         Ok(())
@@ -30,7 +30,7 @@ impl Master {
 
     /// Sends a request to all units, and returns whether anything answers it within this time.
     pub async fn probe(&mut self, pdu: &[u8], time: Duration) -> io::Result<bool> {
-        self.settle(ALL, pdu).await?;
+        self.settle().await?;
         let frame = self.put(ALL, pdu).await?;
         let until = self.free() + time;
         let mut got = Vec::new();

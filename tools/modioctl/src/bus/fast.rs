@@ -43,7 +43,7 @@ impl Master {
     pub async fn ask_fast(&mut self, request: &Request) -> Result<Reply, Lost> {
         let pdu = request.pdu();
         let sent = async {
-            self.settle(ADDRESS, &pdu).await?;
+            self.settle().await?;
             self.put(ADDRESS, &pdu).await
         };
         let own = sent.await.map_err(Lost::Broken)?;
@@ -95,7 +95,7 @@ impl Master {
         for _ in 0..=self.endpoint().retries {
             match self.ask_fast(&request).await {
                 Ok(Reply::Pdu(pdu)) => return Ok(pdu),
-                Ok(_) | Err(Lost::Silent) => {}
+                Ok(_) | Err(Lost::Silent | Lost::Absent(_)) => {}
                 Err(Lost::Garbled(bytes)) => lost = Lost::Garbled(bytes),
                 Err(broken) => return Err(broken),
             }
@@ -107,7 +107,7 @@ impl Master {
     pub async fn scan_step(&mut self, scan: &mut Scan, request: &Request) -> io::Result<()> {
         scan.hear(match self.ask_fast(request).await {
             Ok(reply) => Heard::Reply(reply),
-            Err(Lost::Silent) => Heard::Nothing,
+            Err(Lost::Silent | Lost::Absent(_)) => Heard::Nothing,
             Err(Lost::Garbled(_)) => Heard::Damaged,
             Err(Lost::Broken(error)) => return Err(error),
         });

@@ -3,10 +3,12 @@
 use std::io;
 use std::time::Duration;
 
-use tokio::time::{Instant, timeout, timeout_at};
+use tokio::time::{Instant, sleep, timeout, timeout_at};
 
 use super::adu::{ASCII_MOST, Framing};
 use super::endpoint::Endpoint;
+use super::gateway::{is_busy, is_from_gateway};
+use super::late::Late;
 use super::stream::Stream;
 use super::{Direction, Waiting};
 use crate::failure::Failure;
@@ -25,8 +27,11 @@ const STALE: usize = 16 * 1024;
 /// Time limit for the system to take the bytes of a frame, in addition to the time of the frame on the line.
 const SENDING: Duration = Duration::from_secs(2);
 
+/// Pause before a read is repeated because the unit or a gateway is busy.
+const BUSY: Duration = Duration::from_millis(200);
+
 /// Reads one register. The response never equals the request, so this shows whether an adapter returns what it sends.
-const PROBE: [u8; 5] = {
+pub const PROBE: [u8; 5] = {
     let [high, low] = PRODUCT_CODE.to_be_bytes();
     [3, high, low, 0, 1]
 };
@@ -39,6 +44,8 @@ const NOISE: usize = 3;
 pub enum Lost {
     /// Nothing was received.
     Silent,
+    /// A gateway answered that the unit does not answer it: exception 0A or 0B.
+    Absent(u8),
     /// These bytes were received, and they are not an answer.
     Garbled(Vec<u8>),
     /// The port or the connection is lost.
@@ -66,13 +73,13 @@ pub struct Master {
     endpoint: Endpoint,
     stream: Stream,
     observer: Option<Observer>,
-    transaction: u16,
+    pub(super) transaction: u16,
     /// Time from which the next frame may be sent.
     free: Instant,
     /// Whether the adapter returns what it sends; `None` while that is not known.
-    echo: Option<bool>,
-    /// Unit and PDU of a request whose answer may still be received.
-    owed: Option<(u8, Vec<u8>)>,
+    pub(super) echo: Option<bool>,
+    /// Requests whose answer may still be received.
+    pub(super) late: Late,
 }
 
 impl Master {
@@ -85,7 +92,7 @@ impl Master {
             transaction: 0,
             free: Instant::now(),
             echo: None,
-            owed: None,
+            late: Late::default(),
         })
     }
 
@@ -123,27 +130,37 @@ impl Master {
         self.stream.discard_unsent();
     }
 
-    /// Sends a request to a unit, and repeats it as often as the endpoint says. Returns the PDU of the response, which
-    /// may be an exception. The error is that of the last attempt, unless an earlier one was garbled.
+    /// Sends a request to a unit, and repeats it as often as the endpoint says: without an answer of the unit, and a read
+    /// also when it is busy. Returns the PDU of the response, which may be an exception. The error is that of the last attempt, unless an earlier one was garbled.
     pub async fn ask(&mut self, unit: u8, pdu: &[u8]) -> Result<Vec<u8>, Lost> {
         if self.echo.is_none() && !differs(pdu) {
             self.look_for_echo(unit).await?;
         }
-        let mut garbled = None;
-        for _ in 0..=self.endpoint.retries {
-            match self.ask_once(unit, pdu).await {
-                Err(Lost::Silent) => {}
-                Err(Lost::Garbled(bytes)) => garbled = Some(bytes),
-                result => return result,
-            }
+        if self.endpoint.framing != Framing::Mbap && self.late.can_be_confused(unit, pdu) {
+            self.wait_for_order(unit).await?;
         }
-        Err(garbled.map_or(Lost::Silent, Lost::Garbled))
+        let mut result = Err(Lost::Silent);
+        for _ in 0..=self.endpoint.retries {
+            // The attempt before was answered: the unit is busy.
+            if result.is_ok() {
+                sleep(BUSY).await;
+            }
+            let next = self.ask_once(unit, pdu).await;
+            match &next {
+                Ok(answer) if is_busy(pdu, answer) => {}
+                Ok(_) | Err(Lost::Broken(_)) => return next,
+                Err(Lost::Silent | Lost::Absent(_)) if is_garbled(&result) => continue,
+                Err(_) => {}
+            }
+            result = next;
+        }
+        result
     }
 
     /// Finds out whether the adapter returns what it sends. Without that a response that equals its request proves
     /// nothing. Silence leaves it open, and the request is sent nevertheless: a unit in listen-only mode obeys without
     /// an answer.
-    async fn look_for_echo(&mut self, unit: u8) -> Result<(), Lost> {
+    pub(super) async fn look_for_echo(&mut self, unit: u8) -> Result<(), Lost> {
         let mut result = Ok(());
         for _ in 0..=self.endpoint.retries {
             match self.ask_once(unit, &PROBE).await {
@@ -158,7 +175,7 @@ impl Master {
 
     /// Sends a request when the line is free. Returns before the request has been sent completely.
     async fn send(&mut self, unit: u8, pdu: &[u8]) -> io::Result<()> {
-        self.settle(unit, pdu).await?;
+        self.settle().await?;
         self.put(unit, pdu).await?;
         Ok(())
     }
@@ -197,15 +214,7 @@ impl Master {
     }
 
     /// Waits until the line is free, and discards received bytes: they answer no pending request.
-    pub(super) async fn settle(&mut self, unit: u8, pdu: &[u8]) -> io::Result<()> {
-        if let Some((asked, request)) = self.owed.take()
-            && self.endpoint.framing != Framing::Mbap
-            && asked == unit
-            && request != pdu
-        {
-            // A late answer could be mistaken for the answer to this request.
-            self.free = self.free.max(Instant::now() + self.endpoint.timeout);
-        }
+    pub(super) async fn settle(&mut self) -> io::Result<()> {
         // On a line that is never silent, the request is sent nevertheless.
         let most = self.free + self.endpoint.timeout;
         let mut discarded = 0;
@@ -217,6 +226,11 @@ impl Master {
                 return Ok(());
             }
             self.see(Direction::Response, &stale);
+            while self
+                .late
+                .take(self.endpoint.framing, &mut stale, None)
+                .is_some()
+            {}
             let gap = Instant::now() + self.endpoint.frame_gap();
             self.free = self.free.max(gap);
         }
@@ -236,7 +250,7 @@ impl Master {
         }
     }
 
-    async fn ask_once(&mut self, unit: u8, pdu: &[u8]) -> Result<Vec<u8>, Lost> {
+    pub(super) async fn ask_once(&mut self, unit: u8, pdu: &[u8]) -> Result<Vec<u8>, Lost> {
         self.send(unit, pdu).await.map_err(Lost::Broken)?;
         let sent = self.free;
         let waiting = Waiting {
@@ -246,10 +260,11 @@ impl Master {
             pdu,
         };
         let own = waiting.framing.frame(self.transaction, unit, pdu);
-        let last = sent + self.endpoint.timeout;
+        let mut last = sent + self.patience();
         // An answer that has begun in time has the same time again. Nothing is longer, except a line that is never
         // silent.
-        let end = last + self.endpoint.timeout + self.endpoint.time_of(ASCII_MOST);
+        let longest = self.endpoint.timeout + self.endpoint.time_of(ASCII_MOST);
+        let mut end = last + longest;
         let idle = BATCH + self.endpoint.time_of(12);
         let mut returned = false;
         let mut junk = Vec::new();
@@ -263,6 +278,15 @@ impl Master {
             };
             if read.map_err(Lost::Broken)? > 0 {
                 returned = returned || self.drop_echo(&own, &mut got);
+                if self.take_late(&mut got, Some((unit, pdu))) {
+                    // The unit, or a gateway, begins this request only now.
+                    last = Instant::now() + self.patience();
+                    end = last + longest;
+                    if got.is_empty() {
+                        until = last;
+                        continue;
+                    }
+                }
                 // A busy computer delivers an answer, or an echo, in pieces with a pause between them.
                 let mut all = [junk.as_slice(), &got].concat();
                 if !returned && self.drop_echo(&own, &mut all) {
@@ -274,7 +298,7 @@ impl Master {
                     if let Some((answer, range)) = waiting.find(bytes) {
                         self.received(bytes.get(range).unwrap_or_default());
                         self.note_no_echo(pdu);
-                        return Ok(answer);
+                        return present(answer);
                     }
                 }
                 until = Instant::now() + idle;
@@ -284,7 +308,7 @@ impl Master {
             if let Some(answer) = waiting.whole(&got) {
                 self.received(&got);
                 self.note_no_echo(pdu);
-                return Ok(answer);
+                return present(answer);
             }
             junk.append(&mut got);
             if never_silent || Instant::now() >= last {
@@ -292,7 +316,7 @@ impl Master {
             }
             until = last;
         }
-        self.owed = Some((unit, pdu.to_vec()));
+        self.late.add(&waiting, sent);
         if junk.is_empty() {
             return Err(Lost::Silent);
         }
@@ -337,6 +361,18 @@ impl Master {
                 bytes: bytes.to_vec(),
             });
         }
+    }
+}
+
+const fn is_garbled(result: &Result<Vec<u8>, Lost>) -> bool {
+    matches!(result, Err(Lost::Garbled(_)))
+}
+
+/// Returns the answer of a unit. A gateway answers for a unit that is absent.
+fn present(answer: Vec<u8>) -> Result<Vec<u8>, Lost> {
+    match answer[..] {
+        [0x80..=0xFF, code] if is_from_gateway(code) => Err(Lost::Absent(code)),
+        _ => Ok(answer),
     }
 }
 

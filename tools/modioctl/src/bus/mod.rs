@@ -3,6 +3,8 @@
 mod broadcast;
 pub mod endpoint;
 mod fast;
+mod gateway;
+mod late;
 mod master;
 mod stream;
 mod sweep;
@@ -11,12 +13,7 @@ pub use modbus_line::{Direction, Waiting, adu, decode};
 
 pub use endpoint::{Endpoint, Options, Place};
 pub(crate) use fast::{check_line, shared};
-pub use master::{Lost, MOST, Master, Observer, Seen};
+pub use gateway::{is_busy, sufficient};
+pub use master::{Lost, MOST, Master, Observer, PROBE, Seen};
 pub(crate) use stream::Stream;
 pub use sweep::{Found, LONG, REPORT, SHORT};
-
-/// Returns whether an exception is the answer of a gateway for a unit that does not answer it (V1.1b3 chapter 7, codes
-/// 0A and 0B).
-pub const fn is_from_gateway(code: u8) -> bool {
-    matches!(code, 0x0A | 0x0B)
-}

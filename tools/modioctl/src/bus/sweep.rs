@@ -13,7 +13,7 @@ use std::time::Duration;
 use tokio::time::{Instant, sleep_until};
 
 use super::adu::{ASCII_MOST, Framing, response_length};
-use super::is_from_gateway;
+use super::gateway::is_from_gateway;
 use super::master::{Lost, MOST, Master};
 
 /// Report Server ID (V1.1b3, 6.13). Its response differs from the request, so an adapter that returns the request
@@ -40,6 +40,8 @@ pub struct Found {
     pub units: BTreeSet<u8>,
     /// Addresses whose answer was garbled.
     pub garbled: BTreeSet<u8>,
+    /// Addresses for which a gateway had no time.
+    pub busy: BTreeSet<u8>,
     /// Whether bytes were received all the time. The sweep then ended early.
     pub never_silent: bool,
     /// Number of requests to each address for which no answer has been received.
@@ -125,10 +127,8 @@ impl Master {
         for unit in suspects.difference(&found.units.clone()) {
             found.asked(*unit, 1 + retries);
             match self.ask(*unit, &[REPORT]).await {
-                // A gateway answers for a missing unit.
-                Ok(pdu) if matches!(pdu[..], [_, code] if is_from_gateway(code)) => {}
                 Ok(_) => found.answered(*unit),
-                Err(Lost::Silent) => {}
+                Err(Lost::Silent | Lost::Absent(_)) => {}
                 Err(Lost::Garbled(mut bytes)) => {
                     // Late answers of other units are not garbled ones of this unit.
                     while next(self.endpoint().framing, &mut bytes, found).is_some() {}

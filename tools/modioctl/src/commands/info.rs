@@ -181,7 +181,9 @@ impl fmt::Display for Unidentified {
                 write!(f, "exception {code:02X}, {name}")
             }
             Self::Damaged | Self::Lost(Lost::Garbled(_)) => f.write_str("damaged answer"),
-            Self::Lost(Lost::Silent | Lost::Broken(_)) => f.write_str("no answer"),
+            Self::Lost(Lost::Silent | Lost::Absent(_) | Lost::Broken(_)) => {
+                f.write_str("no answer")
+            }
         }
     }
 }

@@ -5,6 +5,7 @@ use register_map::configuration::COMM_TIMEOUT;
 use register_map::links::NO_SOURCE;
 use serde_json::{Value as Json, json};
 
+use super::note::Note;
 use super::write::UNSAVED;
 use crate::device::{Device, fetch_set};
 use crate::failure::Failure;
@@ -80,8 +81,8 @@ fn as_json(book: &Book, item: &Item, words: &[u16]) -> Json {
     })
 }
 
-/// Writes the link in `text`, or deletes the links of an output.
-pub async fn link(device: &mut Device, text: &str) -> Result<(), Failure> {
+/// Writes the link in `text`, or deletes the links of an output. `done` gets what is written.
+pub async fn link(device: &mut Device, text: &str, done: &Note) -> Result<(), Failure> {
     let book = fetch_set(device).await?;
     let mut note = None;
     let changes = match text.split_whitespace().collect::<Vec<_>>()[..] {
@@ -97,7 +98,7 @@ pub async fn link(device: &mut Device, text: &str) -> Result<(), Failure> {
             vec![(place(&book, &order, &values)?, order.words.to_vec())]
         }
     };
-    device.write_items(&changes).await?;
+    device.write_items(&changes, done).await?;
     for (item, words) in &changes {
         output::line(format_args!(
             "{}: {}",
@@ -113,7 +114,7 @@ pub async fn link(device: &mut Device, text: &str) -> Result<(), Failure> {
     device.warn_of(&book, &words).await
 }
 
-/// Returns the link to write: the one that has this source already, or else the first free one.
+/// Returns the link to write: the link that already has this source, or else the first free link.
 fn place(book: &Book, order: &Order, values: &[Vec<u16>]) -> Result<Item, Failure> {
     let links = || order.links.iter().zip(values);
     let same = links().find(|(_, words)| acts(words) && words.first() == order.words.first());

@@ -7,6 +7,7 @@ mod fast;
 mod info;
 mod links;
 mod module;
+mod note;
 mod ports;
 mod raw;
 mod read;
@@ -26,7 +27,7 @@ use crate::cli::{Cli, Command};
 use crate::device::Device;
 use crate::failure::Failure;
 use crate::{monitor, output, trace};
-use config::Note;
+use note::Note;
 
 /// Exit status of a program that Ctrl-C has ended, as shells define it.
 const INTERRUPTED: u8 = 130;
@@ -59,9 +60,12 @@ pub async fn run(mut cli: Cli) -> Result<ExitCode, Failure> {
         _ = tokio::signal::ctrl_c() => Ok(if until_stopped {
             ExitCode::SUCCESS
         } else {
-            stopped(&note.borrow())
+            stopped(&note.text())
         }),
-        result = dispatch(cli, &note) => result.map(|()| ExitCode::SUCCESS),
+        result = dispatch(cli, &note) => match result {
+            Ok(()) => Ok(ExitCode::SUCCESS),
+            Err(failure) => Err(failure.after(&note.text())),
+        },
     }
 }
 
@@ -110,14 +114,14 @@ async fn dispatch(mut cli: Cli, note: &Note) -> Result<(), Failure> {
     match cli.command {
         Command::Info => info::run(&mut device, json).await,
         Command::Read(options) => read::run(&mut device, &options, json).await,
-        Command::Write(options) => write::run(&mut device, &options, json).await,
-        Command::Module(options) => module::run(device, options).await,
+        Command::Write(options) => write::run(&mut device, &options, json, note).await,
+        Command::Module(options) => module::run(device, options, note).await,
         Command::Config(options) => config::run(device, options, json, note).await,
         Command::Links => links::list(&mut device, json).await,
-        Command::Link { words } => links::link(&mut device, &words.join(" ")).await,
+        Command::Link { words } => links::link(&mut device, &words.join(" "), note).await,
         Command::Watch(options) => watch::run(device, &options, cli.trace).await,
         Command::Events(options) => fast::events::run(device, &options, json).await,
-        Command::Address(options) => fast::address::run(device.master, &options).await,
+        Command::Address(options) => fast::address::run(device.master, &options, note).await,
         Command::Raw(options) => raw::run(&mut device, &options).await,
         Command::Describe => describe::run(&mut device, json).await,
         Command::Export(options) => export::run(&mut device, &options).await,

@@ -3,6 +3,7 @@
 use register_map::codes::Command;
 use register_map::{points, state};
 
+use super::note::{Note, UNDO};
 use crate::cli::Module;
 use crate::device::{Device, fetch};
 use crate::failure::Failure;
@@ -11,7 +12,7 @@ use crate::output;
 use crate::value::{parse, show};
 
 /// Sets up a slot for a module.
-pub async fn run(mut device: Device, options: Module) -> Result<(), Failure> {
+pub async fn run(mut device: Device, options: Module, note: &Note) -> Result<(), Failure> {
     let Module::Set { port, module } = options;
     let book = fetch(&mut device).await?.book;
     let description = book.of_modio()?;
@@ -25,9 +26,25 @@ pub async fn run(mut device: Device, options: Module) -> Result<(), Failure> {
     let item = book.find(&format!("p{port}.module"))?;
     let words = parse(&item, &module, false)?;
     device.unlock().await?;
-    device.write_item(&item, &words).await?;
-    device.save().await?;
+    let name = &item.name;
+    let write = device.write_item(&item, &words);
+    note.during(
+        format_args!("{name} may be written{UNDO}"),
+        "nothing is written",
+        write,
+    )
+    .await?;
+    note.during(
+        format_args!("{name} is written, and may be saved: repeat the command"),
+        format_args!("{name} is written{UNDO}"),
+        device.save(),
+    )
+    .await?;
+    note.set(format_args!(
+        "{name} is saved, and in force after the next restart"
+    ));
     let mut device = device.restart().await?;
+    note.set(format_args!("{name} is saved, and the unit has restarted"));
     let index = u16::from(port) - 1;
     let in_force = device.read_words(state::MODULE_IN_FORCE + index, 1).await?;
     if in_force != words {

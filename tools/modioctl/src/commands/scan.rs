@@ -1,5 +1,7 @@
 //! `modioctl scan`.
 
+mod left;
+
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -8,12 +10,19 @@ use serde_json::json;
 
 use super::info::{Unidentified, identity};
 use crate::bus::adu::Framing;
-use crate::bus::{Endpoint, Found, LONG, Lost, Master, Observer, Place, REPORT, SHORT};
+use crate::bus::{
+    Endpoint, Found, LONG, Lost, Master, Observer, PROBE, Place, REPORT, SHORT, sufficient,
+};
 use crate::cli::Scan;
 use crate::device::{Device, known, place};
 use crate::failure::Failure;
 use crate::names::module_name;
 use crate::output;
+use left::{Left, list};
+
+/// Why a unit may be silent although its line is right.
+const DELAYED: &str =
+    "a unit with a long RESPONSE_DELAY or over the air needs a longer `--timeout`";
 
 /// Shortest time that is worth an announcement.
 const LONG_SCAN: Duration = Duration::from_secs(10);
@@ -36,6 +45,13 @@ struct Scanned {
     found: Found,
     line: Option<Endpoint>,
     echo: bool,
+    /// Addresses that gateways had no time for.
+    busy: Vec<u8>,
+    /// Longest time of a gateway's late answer.
+    late: Duration,
+    /// Number of addresses that were silent.
+    silent: usize,
+    left: Left,
 }
 
 /// Looks for units at the requested rates and formats. Ctrl-C ends the scan, and keeps what was found. Returns whether
@@ -58,29 +74,47 @@ pub async fn run(
     }
     let mut scanned = Scanned::default();
     let bar = progress();
-    let complete = tokio::select! {
+    let result = tokio::select! {
         // Ctrl-C is handled before the scan begins.
         biased;
-        _ = tokio::signal::ctrl_c() => false,
-        result = search(lines, observer, &options.units, &bar, &mut scanned) => {
-            result?;
-            true
-        }
+        _ = tokio::signal::ctrl_c() => Ok(false),
+        result = search(lines, observer, &options.units, &bar, &mut scanned) => result.map(|()| true),
     };
     bar.finish_and_clear();
-    if !complete {
+    if !matches!(result, Ok(true)) {
         scanned.keep_found();
     }
-    print(&scanned, serial, json)?;
+    if scanned.line.is_some() {
+        print(&scanned, serial, json)?;
+    }
+    if !result.map_err(|failure| scanned.left.add_to(failure))? {
+        return Ok(false);
+    }
+    if scanned.late > Duration::ZERO {
+        return Err(Failure::NoAnswer(format!(
+            "the gateway answers late: --timeout {}s waits for all its answers",
+            sufficient(scanned.late)
+        )));
+    }
+    if !scanned.busy.is_empty() {
+        return Err(Failure::Busy(format!(
+            "a gateway, or the units themselves, had no time for addresses {}: scan them again",
+            list(scanned.busy.iter().copied())
+        )));
+    }
     let garbled = !scanned.garbled.is_empty() || !scanned.never_silent.is_empty();
     match (scanned.units.is_empty(), !garbled) {
-        _ if !complete => Ok(false),
-        (false, _) => Ok(true),
+        (false, _) => {
+            if scanned.silent > 0 {
+                eprintln!("modioctl: silent addresses: {}; {DELAYED}", scanned.silent);
+            }
+            Ok(true)
+        }
         (true, false) => Err(Failure::Garbled(
             "no unit could be read: wrong rate or format, two units with one address, or no termination".to_owned(),
         )),
         (true, true) => Err(Failure::NoAnswer(format!(
-            "no unit found{}: check power, wiring (A and B swapped?) and rate (`--rates all`); a unit's address is its DIP switch; a unit with a long RESPONSE_DELAY or over the air needs a longer `--timeout`",
+            "no unit found{}: check power, wiring (A and B swapped?) and rate (`--rates all`); a unit's address is its DIP switch; {DELAYED}",
             match scanned.echo {
                 true => ", and the adapter returns what it sends, which is not an answer",
                 false => "",
@@ -163,11 +197,20 @@ async fn search(
         return Ok(());
     };
     let mut master = Master::open(first.clone(), observer).await?;
+    scanned.left.lines = lines.len();
     for line in lines {
         master.change_line(line.clone())?;
         scanned.found = Found::default();
         scanned.line = Some(line);
-        sweep(&mut master, units, several, bar, &mut scanned.found).await?;
+        scanned.left.lines -= 1;
+        let Scanned { found, left, .. } = scanned;
+        sweep(&mut master, units, several, bar, found, left).await?;
+        if master.endpoint().framing == Framing::Mbap {
+            scanned.late = master.lateness();
+        } else if !found.units.is_empty() && !found.never_silent {
+            scanned.silent += units.len() - found.units.union(&found.garbled).count();
+        }
+        scanned.busy.extend(&scanned.found.busy);
         scanned.echo |= master.has_echo();
         master = look_at_found(master, scanned).await?;
     }
@@ -182,6 +225,7 @@ async fn sweep(
     is_one_of_several: bool,
     bar: &ProgressBar,
     found: &mut Found,
+    left: &mut Left,
 ) -> Result<(), Failure> {
     let endpoint = master.endpoint().clone();
     let line = match &endpoint.place {
@@ -190,7 +234,11 @@ async fn sweep(
     };
     bar.set_message(line.clone());
     let lost = |error| Failure::Port(format!("{} is lost ({error})", place(&endpoint)));
-    let asked = |_| bar.inc(1);
+    let asked = left.begin(units, false, bar);
+    if endpoint.framing == Framing::Mbap {
+        let sweep = master.sweep_gateway(units, found, asked);
+        return sweep.await.map_err(lost);
+    }
     if is_asked_once(&endpoint) {
         let sweep = master.sweep(units, endpoint.timeout, found, asked);
         return sweep.await.map_err(lost);
@@ -206,6 +254,7 @@ async fn sweep(
     bar.inc_length(silent.len() as u64);
     let message = format!("{line} silent addresses, {LONG:?} each");
     bar.set_message(message.trim().to_owned());
+    let asked = left.begin(&silent, true, bar);
     let sweep = master.sweep(&silent, LONG, found, asked);
     sweep.await.map_err(lost)
 }
@@ -228,7 +277,7 @@ async fn look_at_found(mut master: Master, scanned: &mut Scanned) -> Result<Mast
         let unit = look_at(&mut device).await;
         master = device.master;
         match unit {
-            Ok(unit) => scanned.units.push(unit),
+            Ok(unit) => scanned.units.extend(unit),
             Err(Failure::Garbled(_)) if !scanned.found.garbled.contains(&address) => {
                 scanned.garbled.push(format!("{address} ({at})"));
             }
@@ -254,13 +303,13 @@ impl Scanned {
     }
 }
 
-/// Reads the identity of a unit. Fails when its answers are garbled, as those of two units with one address are, or
-/// when the port is lost.
-async fn look_at(device: &mut Device) -> Result<Unit, Failure> {
+/// Reads the identity of a unit. Returns `None` for the address of an absent unit. Fails when its answers are garbled, as
+/// those of two units with one address are, or when the port is lost.
+async fn look_at(device: &mut Device) -> Result<Option<Unit>, Failure> {
     // Use what the unit does answer, even if it does not answer every request.
     fn answered<T: Default>(result: Result<T, Failure>) -> Result<T, Failure> {
         match result {
-            Err(Failure::Refused(_) | Failure::NoAnswer(_)) => Ok(T::default()),
+            Err(Failure::Refused(_) | Failure::Busy(_) | Failure::NoAnswer(_)) => Ok(T::default()),
             other => other,
         }
     }
@@ -276,6 +325,15 @@ async fn look_at(device: &mut Device) -> Result<Unit, Failure> {
         Err(Unidentified::Lost(lost @ (Lost::Garbled(_) | Lost::Broken(_)))) => {
             return Err(device.lost(&lost));
         }
+        // Some gateways reject functions that they do not pass, also for an absent unit. Function 03 they pass.
+        Err(Unidentified::Exception(_))
+            if matches!(
+                device.master.ask(device.unit, &PROBE).await,
+                Err(Lost::Absent(_))
+            ) =>
+        {
+            return Ok(None);
+        }
         Err(reason) => format!("no identification: {reason}"),
     };
     let description = answered(known(device).await)?;
@@ -285,12 +343,12 @@ async fn look_at(device: &mut Device) -> Result<Unit, Failure> {
         let named = ports.map(|port| (port.number, module_name(unit, port.module)));
         modules.extend(named.map(|(port, name)| format!("p{port} {name}")));
     }
-    Ok(Unit {
+    Ok(Some(Unit {
         address: device.unit,
         line: device.master.endpoint().clone(),
         identity,
         modules: modules.join(", "),
-    })
+    }))
 }
 
 fn print(scanned: &Scanned, serial: bool, json: bool) -> Result<(), Failure> {

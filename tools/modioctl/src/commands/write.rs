@@ -3,6 +3,7 @@
 use modio_description::Table;
 use serde_json::json;
 
+use super::note::{Note, Progress};
 use super::read::as_json;
 use crate::cli::Write;
 use crate::device::{Device, fetch};
@@ -17,7 +18,12 @@ pub const UNSAVED: &str = "not saved: save with `modioctl config save`";
 
 /// Writes items by name or address, after all of them have been checked. When a name or a value is wrong, nothing is
 /// written. Reports outputs that links hold, where the unit has accepted the write.
-pub async fn run(device: &mut Device, options: &Write, json: bool) -> Result<(), Failure> {
+pub async fn run(
+    device: &mut Device,
+    options: &Write,
+    json: bool,
+    note: &Note,
+) -> Result<(), Failure> {
     let book = fetch(device).await?.book;
     let mut checked = Vec::new();
     for (name, text) in &options.values {
@@ -25,7 +31,7 @@ pub async fn run(device: &mut Device, options: &Write, json: bool) -> Result<(),
         let words = parse(&item, text, options.raw)?;
         checked.push((item, words));
     }
-    device.write_items(&checked).await?;
+    device.write_items(&checked, note).await?;
     let bits = checked.iter().map(|(item, _)| item);
     let bits = bits.filter(|item| item.meaning == Meaning::Bit);
     let held = device.held(&book, bits).await?;
@@ -63,15 +69,21 @@ pub async fn run(device: &mut Device, options: &Write, json: bool) -> Result<(),
 
 impl Device {
     /// Writes items whose values have been checked. Opens the lock if one of them needs that.
-    pub async fn write_items(&mut self, checked: &[(Item, Vec<u16>)]) -> Result<(), Failure> {
+    pub async fn write_items(
+        &mut self,
+        checked: &[(Item, Vec<u16>)],
+        note: &Note,
+    ) -> Result<(), Failure> {
         let is_locked = |item: &Item| item.setting || item.name == "COMMAND";
+        let settings = checked.iter().filter(|(item, _)| item.setting);
+        let has_settings = settings.clone().count() > 0;
+        let mut progress = Progress::of_values(note, checked.len(), has_settings);
         if checked.iter().any(|(item, _)| is_locked(item)) {
             self.unlock().await?;
         }
-        let settings = checked.iter().filter(|(item, _)| item.setting);
         self.warn_of_line(settings.map(|(item, _)| item.address));
         for (item, words) in checked {
-            self.write_item(item, words).await?;
+            progress.write(1, self.write_item(item, words)).await?;
         }
         Ok(())
     }

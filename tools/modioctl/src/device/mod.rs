@@ -13,7 +13,7 @@ pub use orders::with_modules;
 use other::shown;
 
 use crate::bus::endpoint::{Endpoint, Place};
-use crate::bus::{Lost, MOST, Master, Observer, is_from_gateway};
+use crate::bus::{Lost, MOST, Master, Observer, adu, is_busy};
 use crate::failure::Failure;
 
 /// Largest number of registers that one request can read (V1.1b3, 6.3).
@@ -48,6 +48,7 @@ impl Device {
     /// Sends a request. An exception is a failure; `about` describes the request in its text.
     pub async fn ask(&mut self, pdu: &[u8], about: &str) -> Result<Vec<u8>, Failure> {
         match self.master.ask(self.unit, pdu).await {
+            Ok(response) if is_busy(pdu, &response) => Err(self.busy(&response, about)),
             Ok(response) => match response[..] {
                 [function, code] if function & 0x80 != 0 => Err(self.exception(code, about)),
                 _ => Ok(response),
@@ -127,18 +128,24 @@ impl Device {
         self.master.endpoint().place.is_serial()
     }
 
-    /// Returns the failure for an exception, with its meaning. An exception from a gateway means that the unit does not
-    /// answer.
+    /// Returns the failure for a read that the unit, or a gateway, had no time for.
+    fn busy(&self, response: &[u8], about: &str) -> Failure {
+        let unit = self.unit;
+        let code = response.last().copied().unwrap_or_default();
+        let name = names::exception(code).unwrap_or_default();
+        Failure::Busy(format!(
+            "{about}: unit {unit}, or a gateway in front of it, is busy (exception {code:02X}, {name}): try again, with more `--retries`"
+        ))
+    }
+
+    /// Returns the failure for an exception, with its meaning.
     pub fn exception(&self, code: u8, about: &str) -> Failure {
         let unit = self.unit;
-        if is_from_gateway(code) {
-            return Failure::NoAnswer(format!(
-                "{about}: unit {unit} does not answer the gateway at {} (exception {code:02X})",
-                place(self.master.endpoint())
-            ));
-        }
         let name = names::exception(code).unwrap_or("unknown exception");
         let meaning = match code {
+            1 if self.master.endpoint().framing == adu::Framing::Mbap => {
+                "the unit does not have this function, or the gateway does not pass it"
+            }
             1 => "the unit does not have this function",
             2 => "there is no such point or register, or it cannot be written",
             3 => "the unit does not allow this value",
@@ -166,6 +173,9 @@ impl Device {
             )),
             Lost::Silent => Failure::NoAnswer(format!(
                 "unit {unit} does not answer at {place}: check power, wiring (A and B swapped?), address, rate and format; `modioctl scan` looks for units"
+            )),
+            Lost::Absent(code) => Failure::NoAnswer(format!(
+                "unit {unit} does not answer the gateway at {place} (exception {code:02X}): check power and wiring of the unit, its address, and rate and format in the gateway"
             )),
             Lost::Garbled(bytes) if bytes.len() >= MOST => Failure::Garbled(format!(
                 "the line at {place} is never silent: wrong rate or format, a program that sends all the time, or a line without bias"

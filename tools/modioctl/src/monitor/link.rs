@@ -71,7 +71,9 @@ impl Link {
             None | Some(Failure::NoAnswer(_)) => State::NoAnswer(since),
             Some(Failure::Garbled(_)) => State::Garbled(since),
             Some(Failure::Port(_)) => State::PortLost(since),
-            Some(Failure::Refused(_) | Failure::Usage(_)) => State::Refuses(since),
+            Some(Failure::Refused(_) | Failure::Busy(_) | Failure::Usage(_)) => {
+                State::Refuses(since)
+            }
         }
     }
 

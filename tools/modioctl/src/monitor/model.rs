@@ -158,7 +158,7 @@ impl Model {
             Failure::NoAnswer(_) => counts.no_answer += 1,
             Failure::Garbled(_) => counts.garbled += 1,
             Failure::Port(_) => counts.lost += 1,
-            Failure::Refused(_) | Failure::Usage(_) => {}
+            Failure::Refused(_) | Failure::Busy(_) | Failure::Usage(_) => {}
         }
         self.frames.give_up();
     }

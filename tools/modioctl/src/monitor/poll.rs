@@ -254,7 +254,7 @@ impl Poller {
             self.device = None;
         }
         let pause = match failure {
-            Failure::NoAnswer(_) | Failure::Garbled(_) => self.every,
+            Failure::NoAnswer(_) | Failure::Garbled(_) | Failure::Busy(_) => self.every,
             _ => AGAIN,
         };
         self.tell(Update::Lost(failure));

@@ -226,6 +226,9 @@ impl Campaign {
     /// Fills the queue. Units that run the image come first, because an image on trial must be confirmed in time.
     /// Returns `None` at the end.
     fn plan(&mut self) -> Option<()> {
+        if !self.units.iter().any(Unit::is_active) {
+            self.units.iter_mut().for_each(Unit::look_again);
+        }
         let stages = self.units.iter().map(|unit| unit.stage);
         let is_at = |stage| stages.clone().any(|other| other == stage);
         if is_at(Stage::OnTrial) {

@@ -14,6 +14,8 @@ pub enum Fault {
     Refused(&'static str, u8),
     /// It has rejected the image.
     Rejected(Reason),
+    /// The image that it is to go back to is no longer whole.
+    Aged,
     /// Its answers are not those of an update.
     Strange,
     /// It has taken no block in many rounds.
@@ -26,13 +28,15 @@ pub enum Fault {
     OtherImage,
     /// It has not confirmed the image.
     NotConfirmed,
+    /// A restart would lose its settings, so it was left out.
+    Unsaved,
 }
 
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Silent => {
-                "does not answer any more: check power and wiring, then run the same command again"
+                "does not answer any more: check power and wiring, and whether another program uses the line, then run the same command again"
             }
             Self::Refused(what, code) => {
                 let name = names::exception(*code).unwrap_or("unknown exception");
@@ -48,11 +52,9 @@ impl fmt::Display for Fault {
                 );
             }
             Self::Rejected(reason) => {
-                return write!(
-                    f,
-                    "rejected the image ({}), and runs the previous one",
-                    reason_text(*reason)
-                );
+                let text = reason_text(*reason);
+                write!(f, "rejected the image ({text}), and runs the previous one")?;
+                return f.write_str(advice(*reason));
             }
             Self::Strange => {
                 "answers what this program does not understand: a newer modioctl may be needed"
@@ -69,10 +71,28 @@ impl fmt::Display for Fault {
             Self::OtherImage => {
                 "runs another image than this command sent: another program may update it; see `modioctl update --status`"
             }
+            Self::Aged => {
+                "cannot go back: the image in its other slot has aged (its CRC-32 is wrong), so it runs what it ran before; send the file of that firmware instead"
+            }
+            Self::Unsaved => {
+                "has settings in force that are not saved, and its restart would lose them, so it was left out: save them with `modioctl config save`, or give --force to lose them"
+            }
             Self::NotConfirmed => {
                 "runs the image, but has not confirmed it: run the same command again (the unit goes back after half an hour at most)"
             }
         })
+    }
+}
+
+/// Returns what to do about an image that was rejected, if the reason does not say it.
+const fn advice(reason: Reason) -> &'static str {
+    match reason {
+        Reason::Interrupted => ": check its supply, then run the same command again",
+        Reason::Crc | Reason::Hash => {
+            ": run the same command again; if that fails, too, its flash may be worn"
+        }
+        Reason::NotConfirmed => ": this firmware starts and does not serve; report it",
+        _ => "",
     }
 }
 

@@ -10,6 +10,7 @@ use register_map::update::{BLOCK_BYTES, Header, Manifest, Slot, crc32, intact};
 use sha2::{Digest as _, Sha512};
 
 use crate::failure::Failure;
+use crate::input;
 use crate::value::long;
 
 /// The largest file that is read. Two slots of the largest part have less than a quarter of it.
@@ -83,13 +84,7 @@ impl File {
     /// In one line, what is wrong with the file.
     pub fn read(path: &Path) -> Result<Self, Failure> {
         let wrong = |what: &dyn fmt::Display| Failure::usage(format!("{}: {what}", path.display()));
-        let length = std::fs::metadata(path)
-            .map_err(|error| wrong(&error))?
-            .len();
-        if length > MOST {
-            return Err(wrong(&"too long for an update: a .modio file is needed"));
-        }
-        let bytes = std::fs::read(path).map_err(|error| wrong(&error))?;
+        let bytes = input::read(path, MOST).map_err(|what| wrong(&what))?;
         Self::of(&bytes).map_err(|what| wrong(&what))
     }
 
@@ -107,9 +102,15 @@ impl File {
             .filter(|manifest| Sha512::digest(body)[..] == manifest.hash)
             .ok_or("the file is damaged: copy it again")?;
         let parts = manifest.images_in(body);
-        let [a, b] = parts.map(|part| part.ok_or("the manifest names no image in the file"));
-        let (board, a) = image(a?, Slot::A)?;
-        let (other, b) = image(b?, Slot::B)?;
+        let [Some(first), Some(second)] = parts else {
+            return Err("the manifest names no image in the file".to_owned());
+        };
+        let (board, a) = image(first, Slot::A)?;
+        let (other, b) = image(second, Slot::B)?;
+        let padding = [&a, &b].map(|image| image.blocks.as_flattened());
+        if padding.concat() != body {
+            return Err("the file has bytes that belong to no image".to_owned());
+        }
         if board != other || a.words[..5] != b.words[..5] {
             return Err("the two images are not of one board and one version".to_owned());
         }
@@ -158,6 +159,13 @@ fn image(bytes: &[u8], slot: Slot) -> Result<(&'static Board, Image), String> {
         .blocks(layout.slot as usize)
         .map_err(|_| wrong(&format!("does not fit a slot of the {board}")))?;
     intact(bytes, crc32).map_err(|_| wrong("is cut short, or its CRC-32 is wrong"))?;
+    let application = bytes.get(HEADER as usize..).unwrap_or_default();
+    if application.len() != header.length() as usize {
+        return Err(wrong("is longer than its header says"));
+    }
+    if Sha512::digest(application)[..] != header.hash() {
+        return Err(wrong("does not have the SHA-512 in its header"));
+    }
     let blocks = bytes.chunks(BLOCK_BYTES).map(|chunk| {
         let mut block = [0xFF; BLOCK_BYTES];
         block[..chunk.len()].copy_from_slice(chunk);
@@ -238,7 +246,55 @@ pub(crate) mod tests {
         unsealed[600] ^= 1;
         assert!(refused(&file([a.clone(), unsealed])).contains("CRC-32"));
         let long = image(Slot::B, 54 * 1024);
-        assert!(refused(&file([a, long])).contains("does not fit a slot"));
+        assert!(refused(&file([a.clone(), long])).contains("does not fit a slot"));
+        let mut other_hash = b.clone();
+        other_hash[91] ^= 1;
+        let text = refused(&file([a.clone(), other_hash]));
+        assert_eq!(
+            text,
+            "the image for slot B does not have the SHA-512 in its header"
+        );
+    }
+
+    #[test]
+    fn bytes_after_the_length_in_the_header_are_refused() {
+        let [a, b] = [image(Slot::A, 1000), image(Slot::B, 1000)];
+        let refused = |images| File::of(&file(images)).unwrap_err();
+        let longer = [b.clone(), vec![0xFF; 4]].concat();
+        assert_eq!(
+            refused([a.clone(), longer]),
+            "the image for slot B is longer than its header says"
+        );
+        // The rest of the last block.
+        let mut bytes = file([a, b]);
+        bytes[1512] = 0;
+        let (body, manifest) = bytes.split_last_chunk_mut::<BLOCK_BYTES>().unwrap();
+        let mut decoded = Manifest::decode(manifest).unwrap();
+        decoded.hash = Sha512::digest(&*body).into();
+        *manifest = decoded.encode();
+        assert_eq!(
+            File::of(&bytes).unwrap_err(),
+            "the file has bytes that belong to no image"
+        );
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn a_device_or_a_pipe_is_refused_before_it_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("pipe");
+        let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+        assert!(made.unwrap().success());
+        for path in [&pipe, Path::new("/dev/zero")] {
+            let text = File::read(path).unwrap_err().to_string();
+            let why = ": not a file, but a pipe, a device or a folder: copy it to a file first";
+            assert_eq!(text, format!("{}{why}", path.display()));
+        }
+        let long = folder.path().join("long");
+        let file = std::fs::File::create(&long).unwrap();
+        file.set_len(MOST + 1).unwrap();
+        let text = File::read(&long).unwrap_err().to_string();
+        assert!(text.ends_with(": longer than 1024 KiB"), "{text}");
     }
 
     #[test]

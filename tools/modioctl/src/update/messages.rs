@@ -77,21 +77,19 @@ impl Status {
         })
     }
 
-    /// Returns whether the unit, whose board is that of the image, runs this image, perhaps signed with another key.
+    /// Returns whether the unit, whose board is that of the image, runs this image, perhaps signed with another key. A unit
+    /// that does not report the CRC-32 may run another one.
     #[must_use]
     pub fn runs(&self, image: &Image) -> bool {
         let ([words, _], [crc, _]) = (&self.images, self.crcs);
-        match crc {
-            0 => *words == image.words,
-            crc => (words[2], crc) == (image.epoch(), image.crc),
-        }
+        crc != 0 && (words[2], crc) == (image.epoch(), image.crc)
     }
 
     /// Returns whether the other slot has the header of exactly this image.
     #[must_use]
     pub fn has(&self, image: &Image) -> bool {
         let ([_, words], [_, crc]) = (&self.images, self.crcs);
-        *words == image.words && [0, image.crc].contains(&crc)
+        crc != 0 && *words == image.words && crc == image.crc
     }
 }
 

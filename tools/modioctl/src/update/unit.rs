@@ -16,6 +16,9 @@ const RESTART_POLLS: u8 = 60;
 /// Number of such polls that show the state before an order, after which the order is given again: its answer may have
 /// been that of a frame that was lost.
 const UNCHANGED_POLLS: u8 = 8;
+/// Number of polls until a unit that was given up because it was silent must answer: a restart with the check of an image
+/// takes less.
+const RETURN_POLLS: u8 = 12;
 /// Number of times that an order is given to a unit.
 const ORDERS: u8 = 4;
 /// Number of times that a unit which is busy is sent a block.
@@ -63,10 +66,16 @@ pub struct Unit {
     pub(super) missing: Vec<bool>,
     /// Whether `missing` is what the unit has reported since the last block.
     pub(super) is_known: bool,
-    /// Number of missing blocks in its last report.
+    /// The least number of missing blocks that it has reported since it was prepared.
     reported: usize,
     /// Whether it was prepared before this program started, perhaps over another line.
     was_prepared: bool,
+    /// The order to start the image was given again after its check was interrupted.
+    was_interrupted: bool,
+    /// It was given up because it was silent, and was looked for once more.
+    was_silent: bool,
+    /// It has not answered since then.
+    is_sought: bool,
     silences: u8,
     orders: u8,
     polls: u8,
@@ -87,6 +96,9 @@ impl Unit {
             is_known: false,
             reported: image[5].into(),
             was_prepared: stage == Stage::Receiving,
+            was_interrupted: false,
+            was_silent: false,
+            is_sought: false,
             silences: 0,
             orders: 0,
             polls: 0,
@@ -154,15 +166,38 @@ impl Unit {
     /// Notes an answer.
     pub(super) const fn answered(&mut self) {
         self.silences = 0;
+        self.is_sought = false;
     }
 
     /// Notes that a request had no answer.
     pub(super) const fn silent(&mut self) {
         self.silences = self.silences.saturating_add(1);
         if matches!(self.stage, Stage::Restarting) {
-            self.poll(RESTART_POLLS, Fault::Silent);
+            let most = if self.is_sought {
+                RETURN_POLLS
+            } else {
+                RESTART_POLLS
+            };
+            self.poll(most, Fault::Silent);
         } else if self.silences >= SILENCES {
             self.fail(Fault::Silent);
+        }
+    }
+
+    /// Looks once more for a unit that was given up because it was silent. Another program may have updated it, and it was
+    /// silent while it restarted.
+    pub(super) fn look_again(&mut self) {
+        if self.stage == Stage::Failed(Fault::Silent) && !self.was_silent {
+            (self.was_silent, self.is_sought) = (true, true);
+            self.ordered(Stage::Restarting);
+        }
+    }
+
+    /// Notes that version and commit are not those of the image. File 2 shows why.
+    pub(super) const fn is_another(&mut self) {
+        self.count_order(Fault::OtherImage);
+        if self.is_active() {
+            self.ordered(Stage::Restarting);
         }
     }
 
@@ -194,7 +229,9 @@ impl Unit {
 
     /// Takes the state while the unit erases.
     pub(super) fn erases(&mut self, status: &Status) {
-        if status.pages > 0 {
+        if status.slot == self.target {
+            self.ordered(Stage::Restarting);
+        } else if status.pages > 0 {
             self.poll(ERASE_POLLS, Fault::NoProgress);
         } else if status.state == Some(State::Receiving) {
             self.stage = Stage::Receiving;
@@ -209,12 +246,15 @@ impl Unit {
     /// Takes the state after a round of blocks. Returns whether the bits are needed.
     pub(super) fn reports(&mut self, status: &Status) -> bool {
         let all = usize::from(status.blocks) == self.missing.len();
-        if status.state != Some(State::Receiving) {
+        if status.slot == self.target {
+            // Another program has updated it. The order to prepare would erase its way back.
+            self.ordered(Stage::Restarting);
+        } else if status.state != Some(State::Receiving) {
             // It has restarted, and begins again.
             self.stage = Stage::Waiting;
         } else if all && status.missing > 0 {
             return true;
-        } else if let (false, Some(State::Rejected(reason))) = (all, refused(status.reason)) {
+        } else if let (false, Some(reason)) = (all, refused(status.reason)) {
             self.reject(reason);
         } else {
             self.is_missing(|_| !all);
@@ -240,14 +280,14 @@ impl Unit {
         self.reported = self.missing.len();
     }
 
-    /// Notes the missing blocks, and whether there are fewer than in the last report.
+    /// Notes the missing blocks, and whether there are fewer than in any report before.
     fn is_missing(&mut self, block: impl Fn(usize) -> bool) {
         let blocks = self.missing.iter_mut().enumerate();
         blocks.for_each(|(n, missing)| *missing = block(n));
         self.is_known = true;
-        let before = self.reported;
-        self.reported = self.lacks();
-        if self.reported < before {
+        let lacks = self.lacks();
+        if lacks < self.reported {
+            self.reported = lacks;
             self.rounds = 0;
         } else if std::mem::take(&mut self.was_prepared) {
             // Perhaps for another line, whose blocks alone it takes.
@@ -260,8 +300,12 @@ impl Unit {
         }
     }
 
-    const fn reject(&mut self, reason: Reason) {
-        self.fail(Fault::Rejected(reason));
+    fn reject(&mut self, reason: Reason) {
+        let has_aged = self.starts == Command::GoBack && reason == Reason::Crc;
+        self.fail(match has_aged {
+            true => Fault::Aged,
+            false => Fault::Rejected(reason),
+        });
     }
 
     /// Takes the state after the order to start the image.
@@ -277,10 +321,15 @@ impl Unit {
         }
         self.poll(RESTART_POLLS, Fault::NotStarted);
         let goes_back = self.starts == Command::GoBack;
+        if let (Some(State::Confirmed), Some(reason)) = (status.state, refused(status.reason)) {
+            // The unit took the order to go back, and refused the image then.
+            return self.reject(reason);
+        }
         match status.state {
             // The order is being carried out.
             Some(State::New | State::Checking | State::Trial(_)) => {}
-            Some(State::Rejected(Reason::Interrupted | Reason::NotConfirmed)) if !goes_back => {
+            Some(State::Rejected(Reason::Interrupted)) if !goes_back && !self.was_interrupted => {
+                self.was_interrupted = true;
                 self.again(Fault::NotStarted);
             }
             Some(State::Rejected(reason)) => self.reject(reason),
@@ -315,7 +364,10 @@ impl Unit {
     }
 }
 
-/// Returns the state that a reason stands for.
-fn refused(reason: u16) -> Option<State> {
-    State::from_code(6, u8::try_from(reason).ok()?)
+/// Returns why a unit has refused an image; `None` if it has not.
+fn refused(reason: u16) -> Option<Reason> {
+    match State::from_code(6, u8::try_from(reason).ok()?)? {
+        State::Rejected(reason) => Some(reason),
+        _ => None,
+    }
 }

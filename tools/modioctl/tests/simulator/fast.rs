@@ -11,10 +11,10 @@ use crate::served::serve;
 use crate::unit::Unit;
 
 /// Serves a unit of another maker, through an adapter that returns what it sends. It has registers 200 to 219 only. Its
-/// first reply to the start of a scan is damaged.
-fn other_maker() -> SocketAddr {
+/// first reply to the start of a scan is damaged. With `ends` the line is lost when the unit is asked for its name.
+fn other_maker(ends: bool) -> SocketAddr {
     const SERIAL: [u8; 4] = [0, 1, 0xEB, 0x37];
-    serve(|mut line| {
+    serve(move |mut line| {
         let mut bytes = [0; 64];
         let mut is_found = false;
         let mut starts = 0;
@@ -35,6 +35,7 @@ fn other_maker() -> SocketAddr {
                 }
                 [0x46, 2] if !is_found => found,
                 [0x46, 2] => vec![0x46, 4],
+                [0x46, 8, ..] if ends => return,
                 [0x46, 8, _, _, _, _, 3, 0, 200, 0, 20] => [&head[..], &[3, 40], &letters].concat(),
                 [0x46, 8, ..] => [&head[..], &[pdu[6] | 0x80, 2]].concat(),
                 _ => continue,
@@ -53,8 +54,16 @@ fn other_maker() -> SocketAddr {
 
 #[test]
 fn a_unit_of_another_maker_is_found_after_a_damaged_reply_with_its_name() {
-    let text = At::tcp(other_maker()).run("scan --fast").fine();
+    let text = At::tcp(other_maker(false)).run("scan --fast").fine();
     has(&text, &["12", "0001EB37", "WBMSW4", "damaged replies"]);
+}
+
+#[test]
+fn a_fast_scan_whose_line_is_lost_prints_what_it_found() {
+    let ran = At::tcp(other_maker(true)).run("scan --fast");
+    assert_eq!(ran.status, 5, "{ran:?}");
+    has(&ran.out, &["12", "0001EB37"]);
+    has(&ran.err, &["is lost", "the scan is not complete"]);
 }
 
 #[test]

@@ -4,9 +4,11 @@
 
 #![cfg(unix)]
 
+mod behind_gateway;
 mod bus;
 mod closed;
 mod commands;
+mod ending;
 mod errors;
 mod fast;
 mod gateway;

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use modbus_reference::{Device, Server, framed};
 use modioctl::bus::adu::{Framing, request_length};
 
-use crate::program::At;
+use crate::program::{At, has};
 use crate::served::{response, serve_requests};
 use crate::unit::Unit;
 
@@ -193,5 +193,49 @@ fn a_scan_that_finds_nothing_names_the_response_delay_and_the_radio() {
     let text = At::tcp(bus).run("scan --units 1-2").failed(3);
     for part in ["RESPONSE_DELAY", "over the air", "--timeout"] {
         assert!(text.contains(part), "{text}");
+    }
+}
+
+#[test]
+fn a_scan_with_silent_addresses_names_the_response_delay_and_the_radio() {
+    let (bus, _) = bus(BTreeSet::from([2]), Duration::ZERO);
+    let at = At::tcp(bus);
+    let ran = at.run("scan --units 1-4");
+    assert_eq!(ran.status, 0, "{ran:?}");
+    has(
+        &ran.err,
+        &[
+            "silent addresses: 3",
+            "RESPONSE_DELAY",
+            "over the air",
+            "--timeout",
+        ],
+    );
+    assert_eq!(at.run("scan --units 2").err, "");
+}
+
+#[test]
+fn a_scan_whose_line_is_lost_prints_what_it_found_and_what_it_did_not_do() {
+    for fails_at in [5, 2] {
+        let mut server = Server::new(None, Device::new(4, 4));
+        let mut asked = BTreeSet::new();
+        let line = serve_requests(move |unit, pdu| {
+            // The first unit is lost in the first pass, the second one in the second pass.
+            let again = !asked.insert(unit);
+            if unit == fails_at && (unit == 5 || again) {
+                return None;
+            }
+            let frame = response(&mut server, unit, pdu);
+            Some(if unit == 1 { frame } else { Vec::new() })
+        });
+        let ran = At::tcp(line).run("scan --units 1-9");
+        assert_eq!(ran.status, 5, "{ran:?}");
+        assert!(ran.out.starts_with("1  "), "{ran:?}");
+        let not_done = match fails_at {
+            5 => "-9 were not asked",
+            _ => "-9 were not asked a second time",
+        };
+        has(&ran.err, &["is lost", not_done]);
+        assert_eq!(ran.err.lines().count(), 1, "{ran:?}");
     }
 }

@@ -7,7 +7,7 @@ use std::thread;
 
 use modbus_reference::{Device, Server};
 use modio_description::{checksum, describe};
-use modioctl::bus::adu::Framing;
+use modioctl::bus::adu::{Framing, request_length};
 use register_map::board::MODIO_02;
 use register_map::configuration::MODULE;
 use register_map::state::{
@@ -38,13 +38,20 @@ pub fn serve_requests(
     serve(move |mut master| {
         let mut bytes = [0; 512];
         while let Ok(count @ 1..) = master.read(&mut bytes) {
-            let Some((unit, pdu)) = Framing::Rtu.open(&bytes[..count]) else {
-                continue;
-            };
-            let Some(bytes) = answer.lock().unwrap()(unit, &pdu) else {
-                return;
-            };
-            let _ = master.write_all(&bytes);
+            let mut rest = &bytes[..count];
+            while !rest.is_empty() {
+                // One read may return several requests.
+                let length = request_length(rest).filter(|length| *length <= rest.len());
+                let (request, after) = rest.split_at(length.unwrap_or(rest.len()));
+                rest = after;
+                let Some((unit, pdu)) = Framing::Rtu.open(request) else {
+                    continue;
+                };
+                let Some(bytes) = answer.lock().unwrap()(unit, &pdu) else {
+                    return;
+                };
+                let _ = master.write_all(&bytes);
+            }
         }
     })
 }

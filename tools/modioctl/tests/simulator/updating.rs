@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use modio_description::{checksum, describe};
 use modioctl::bus::adu::Framing;
 use modioctl::update::File;
 use register_map::Module;
-use register_map::board::MODIO_02;
-use register_map::state::{BUILD, DESCRIPTION_CRC, FIRMWARE_VERSION, UPDATE};
+use register_map::codes::FaultKind;
+use register_map::fault;
+use register_map::state::{FIRMWARE_VERSION, STATUS, UPDATE};
 use register_map::update::{DEVELOPMENT_KEY, Slot, State};
 
 use crate::program::{At, Ran, has, modioctl};
@@ -25,6 +25,9 @@ mod model;
 mod sample;
 
 use model::{Flaw, Model};
+
+mod failing;
+mod keys;
 
 /// Blocks of the image.
 const BLOCKS: usize = 100;
@@ -41,11 +44,15 @@ struct Line {
 impl Line {
     /// Serves units 1 to `count`, after a change of each.
     fn new(count: u8, change: impl FnMut(&mut Model)) -> Self {
-        Self::with_echo(count, change, false)
+        Self::with(count, change, false, usize::MAX)
     }
 
     /// The same, with an adapter that may return what it sends.
     fn with_echo(count: u8, change: impl FnMut(&mut Model), echo: bool) -> Self {
+        Self::with(count, change, echo, usize::MAX)
+    }
+
+    fn with(count: u8, change: impl FnMut(&mut Model), echo: bool, cut: usize) -> Self {
         let mut units: Vec<_> = (1..=count).map(Model::new).collect();
         for unit in &mut units {
             unit.page = Duration::from_millis(2);
@@ -54,7 +61,7 @@ impl Line {
         units.iter_mut().for_each(change);
         let units = Arc::new(Mutex::new(units));
         let written = Arc::default();
-        let at = At::tcp(serve(&units, &written, echo));
+        let at = At::tcp(serve(&units, &written, echo, cut));
         let folder = tempfile::tempdir().unwrap();
         Self {
             units,
@@ -99,22 +106,34 @@ fn file(folder: &Path, key: u32) -> PathBuf {
     path
 }
 
+/// Serves units on a line. The connection is lost after this number of requests that write.
 fn serve(
     units: &Arc<Mutex<Vec<Model>>>,
     written: &Arc<Mutex<Vec<Vec<u8>>>>,
     echo: bool,
+    cut: usize,
 ) -> SocketAddr {
     let (units, written) = (Arc::clone(units), Arc::clone(written));
     let begin = Instant::now();
-    let mut server = server(modio_02(Module::Di4));
+    let fault = [
+        (fault::KIND, FaultKind::Panic.code()),
+        (fault::PROGRAM_COUNTER, 0x0801),
+        (fault::PROGRAM_COUNTER + 1, 0x2344),
+        (fault::UPTIME + 1, 3),
+    ];
+    let mut server = server(modio_02(Module::Di4).into_iter().chain(fault));
     serve_requests(move |unit, pdu| {
         if matches!(pdu[0], 6 | 0x15) {
-            written.lock().unwrap().push(pdu.to_vec());
+            let mut written = written.lock().unwrap();
+            if written.len() == cut {
+                return None;
+            }
+            written.push(pdu.to_vec());
         }
         let mut units = units.lock().unwrap();
         let first = u16::from_be_bytes([pdu[1], pdu[2]]);
         let is_points =
-            pdu[0] == 1 || (pdu[0] == 3 && ![FIRMWARE_VERSION, BUILD, UPDATE].contains(&first));
+            pdu[0] == 1 || (pdu[0] == 3 && ![FIRMWARE_VERSION, STATUS, UPDATE].contains(&first));
         let mut bytes = match echo {
             true => Framing::Rtu.frame(0, unit, pdu),
             false => Vec::new(),
@@ -197,78 +216,6 @@ fn nothing_is_sent_unless_the_file_suits_every_unit() {
     assert_eq!(line.written.lock().unwrap().len(), 0);
 }
 
-/// Numbers of the keys of a loader.
-const KEYS: [u32; 2] = [0x0101_FFFF, 0x0202_EEEE];
-
-#[test]
-fn a_file_by_the_second_key_ends_the_first_only_when_that_is_asked_for() {
-    let [first, second] = KEYS;
-    let line = Line::new(3, |unit| {
-        // Unit 3 has ended its first key before.
-        (unit.keys, unit.revoked) = (KEYS, unit.address == 3);
-    });
-    let text = line.run_by(second, "update FILE --units 1-3").failed(2);
-    let asks = "nothing was sent: the file is signed with the second key of units 1-2, so it ends the first key there";
-    has(&text, &[asks, ": give --end-first-key"]);
-    let text = line
-        .run_by(first, "update FILE --units 1-2 --end-first-key")
-        .failed(2);
-    has(
-        &text,
-        &["unit 1 keeps its first key, 0101ffff: ", "; unit 2 keeps"],
-    );
-    let text = line.run_by(first, "update FILE --units 1-3").failed(2);
-    has(
-        &text,
-        &["nothing was sent: unit 3 takes no file by its first key"],
-    );
-    let text = line.run_by(3, "update FILE").failed(2);
-    has(
-        &text,
-        &["unit 1 takes only files by the keys 0101ffff and 0202eeee"],
-    );
-    assert_eq!(line.written.lock().unwrap().len(), 0);
-
-    // Also when the unit runs that file already.
-    let runs = Line::new(1, |unit| unit.keys = KEYS);
-    let image = File::read(&file(runs.folder.path(), first)).unwrap().images[0].clone();
-    runs.units.lock().unwrap()[0].images[0] = image.words;
-    has(
-        &runs.run_by(first, "update FILE").fine(),
-        &["it runs that already"],
-    );
-    let text = runs.run_by(first, "update FILE --end-first-key").failed(2);
-    has(&text, &["unit 1 keeps its first key, 0101ffff: "]);
-
-    let ran = line.run_by(second, "update FILE --units 1-3 --end-first-key");
-    has(
-        &ran.err,
-        &["ends the first key of units 1-2, for good: neither SW01 = 254 nor 0xB004"],
-    );
-    let done = "0.1.2 (00030004) -> 0.3.1 (1a2b3c4d) in slot B, confirmed";
-    has(&ran.fine(), &[&format!("unit 1: {done}")]);
-    assert!(line.units.lock().unwrap().iter().all(|unit| unit.revoked));
-    let ended =
-        "modioctl: the first key is ended in units 1-3: only the second signs updates there\n";
-    assert_eq!(line.run("update --status --units 1-3").err, ended);
-    let json = line.run("--json update --status").fine();
-    has(&json, &["\"first_key_ended\": true"]);
-}
-
-#[test]
-fn no_order_is_given_to_go_back_to_an_image_by_a_revoked_key() {
-    let line = Line::new(1, |unit| {
-        (unit.keys, unit.state) = (KEYS, State::Confirmed);
-        unit.images[1] = [0x0100, 7, 0, 0xAAAA, 0xBBBB, 20, 0x0101, 0xFFFF];
-        unit.images[0][6..].copy_from_slice(&[0x0202, 0xEEEE]);
-        unit.revoked = true;
-    });
-    let text = line.run("update --back").failed(2);
-    let why = "unit 1 cannot go back: 1.0.7 (aaaabbbb) is signed with the first key of the unit, which is revoked";
-    has(&text, &[why]);
-    assert_eq!(line.written.lock().unwrap().len(), 0);
-}
-
 #[test]
 fn a_unit_that_runs_another_image_of_the_same_commit_is_updated() {
     let line = Line::new(2, |unit| unit.crcs[0] = u32::from(unit.address));
@@ -289,55 +236,19 @@ fn a_unit_that_runs_another_image_of_the_same_commit_is_updated() {
 }
 
 #[test]
-fn older_firmware_reports_neither_crc_nor_keys_and_is_updated() {
+fn older_firmware_reports_neither_crc_nor_keys_and_is_updated_each_time() {
     let line = Line::new(1, |unit| unit.older = true);
     let text = line.run("update FILE").fine();
     has(
         &text,
         &["unit 1: 0.1.2 (00030004) -> 0.3.1 (1a2b3c4d) in slot B, confirmed"],
     );
+    // It may run another image of the same commit.
     let text = line.run("update FILE").fine();
-    has(&text, &["it runs that already"]);
-}
-
-#[test]
-fn units_that_accept_a_development_key_are_named_in_one_line() {
-    let line = Line::new(4, |unit| unit.development = unit.address != 3);
-    let names = |ran: &Ran, units: &str| {
-        let line =
-            format!("modioctl: a development key, which everybody has, is accepted by {units}: ");
-        assert!(ran.err.starts_with(&line), "{ran:?}");
-        assert_eq!(ran.err.lines().count(), 1, "{ran:?}");
-    };
-    names(&line.run("update --status --units 1-4"), "units 1-2, 4");
-    names(&line.run("update FILE --units 1,3"), "unit 1");
-    let ran = line.run("update --status --units 3");
-    assert_eq!(ran.err, "", "no development key");
-    let json: serde_json::Value =
-        serde_json::from_str(&line.run("--json update --status --units 3-4").fine()).unwrap();
-    assert_eq!(
-        [0, 1].map(|unit: usize| &json[unit]["development"]),
-        [&false, &true]
+    has(
+        &text,
+        &["unit 1: 0.3.1 (1a2b3c4d) -> 0.3.1 (1a2b3c4d) in slot A, confirmed"],
     );
-}
-
-#[test]
-fn info_names_a_development_key_that_the_loader_accepts_and_a_version_that_is_no_release() {
-    for (build, accepts, version) in [(0b1010, true, "0.1.0"), (0b1_0010, false, "0.1.0-dev")] {
-        // The unit does not serve its description, so the program must know it.
-        let description = describe(&MODIO_02, version, |_| Module::Di4);
-        let crc = (DESCRIPTION_CRC, checksum(&description.encode()));
-        let registers = modio_02(Module::Di4).into_iter();
-        let mut server = server(registers.chain([(BUILD, build), crc]));
-        let address = serve_requests(move |unit, pdu| Some(response(&mut server, unit, pdu)));
-        let text = At::tcp(address).run("info").fine();
-        let row = text.lines().find(|line| line.starts_with("  build "));
-        let row = row.unwrap();
-        let says = row.contains("the loader accepts the development key");
-        assert_eq!(says, accepts, "{row}");
-        let no_release = version.ends_with("-dev");
-        assert_eq!(row.contains("no release"), no_release, "{row}");
-    }
 }
 
 #[test]
@@ -395,8 +306,8 @@ fn what_is_in_a_file_is_shown_without_a_unit() {
 
 #[test]
 fn a_unit_without_a_loader_cannot_be_updated() {
+    // Register UPDATE is 0.
     let mut server = server(modio_02(Module::Di4));
-    server.device.lacks.push(0x14);
     let address = serve_requests(move |unit, pdu| Some(response(&mut server, unit, pdu)));
     let line = Line::new(0, |_| ());
     let at = At::tcp(address);
@@ -407,54 +318,6 @@ fn a_unit_without_a_loader_cannot_be_updated() {
             &["unit 1 has no loader, so it cannot be updated over the line"],
         );
     }
-}
-
-#[test]
-fn after_ctrl_c_the_same_command_sends_what_is_missing() {
-    let line = Line::new(2, |_| ());
-    let words = line.words("update FILE --units 1-2 --unicast --poll p5.1");
-    let mut running = line.at.start(&words);
-    running.out.wait_for("p5.1 off");
-    while line.blocks() < 50 {
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    running.interrupt();
-    let ran = running.end();
-    assert_eq!(ran.status, 130, "{ran:?}");
-    has(&ran.err, &["the same command goes on where it stopped"]);
-    let sent = line.blocks();
-    let text = line.run("update FILE --units 1-2").fine();
-    has(&text, &["unit 1: 0.1.2", "unit 2: 0.1.2"]);
-    // Unit 2 had no block.
-    let more = line.blocks() - sent;
-    assert!(more < BLOCKS + 60, "{more} after {sent}");
-}
-
-#[test]
-fn a_unit_that_drops_out_is_reported_and_the_others_go_on() {
-    let line = Line::new(3, |unit| match unit.address {
-        2 => unit.flaw = Flaw::GoneAfter(60),
-        3 => unit.flaw = Flaw::Rejects(register_map::update::Reason::Signature),
-        _ => (),
-    });
-    let ran = line.run("--retries 0 update FILE --units 1-3");
-    assert_eq!(ran.status, 1, "{ran:?}");
-    has(
-        &ran.out,
-        &[
-            "unit 1: 0.1.2 (00030004) -> ",
-            "unit 2: 0.1.2 (00030004), not updated to ",
-        ],
-    );
-    has(
-        &ran.err,
-        &["modioctl: unit 2 does not answer any more: check power"],
-    );
-    has(
-        &ran.err,
-        &["modioctl: unit 3 rejected the image (its signature is not by a key"],
-    );
-    assert_eq!(ran.err.lines().count(), 2, "{ran:?}");
 }
 
 #[test]

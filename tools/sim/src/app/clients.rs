@@ -60,8 +60,8 @@ impl Client {
         &self.link.stream
     }
 
-    /// Notes that the client has sent something. Among clients that send, the one that has been silent for the longest
-    /// loses its place first.
+    /// Notes that the client has sent something. Of the clients that send, the client with the longest silence loses its
+    /// place first.
     pub fn heard(&self) {
         *self.link.heard() = Some(Instant::now());
     }

@@ -22,7 +22,7 @@ pub struct FlashFile {
     holds: Option<u64>,
     /// The last write error that was reported.
     reported: Option<String>,
-    /// What has happened at the start to the firmware in the file, if a user might not expect it.
+    /// A change that the start made to the firmware in the file, if a user might not expect the change.
     pub note: Option<&'static str>,
 }
 

@@ -84,7 +84,7 @@ impl Firmware {
     /// an earlier firmware has left, if there was one; its configuration remains.
     ///
     /// If an update over the line has changed the flash, the images in it remain, except when `anew` is set. The text
-    /// says what has happened to the earlier firmware, if a user might not expect it.
+    /// reports a change of the earlier firmware that a user might not expect.
     ///
     /// # Errors
     ///

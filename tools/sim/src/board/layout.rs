@@ -162,7 +162,8 @@ pub const MODIO_08: Layout = Layout {
 
 impl Layout {
     /// All types of boards.
-    const ALL: [&'static Self; 5] = [&MODIO_02, &MODIO_08, &FX3U_14, &FX3U_24, &ETH_IO5R];
+    const ALL: [&'static Self; Board::ALL.len()] =
+        [&MODIO_02, &MODIO_08, &FX3U_14, &FX3U_24, &ETH_IO5R];
 
     /// Returns the layout of a board of the register map.
     #[must_use]

@@ -7,8 +7,8 @@
 //! edge.
 //!
 //! [`crate::bus`] runs the boards in an order that ensures this, within half a bit. An edge that an
-//! end gets late takes effect at its true instant if nothing has happened at that end since then, and otherwise at the
-//! time of that end.
+//! end receives late takes effect at its true instant, if nothing has happened at this end since that instant. Otherwise
+//! the edge takes effect at the present time of the end.
 
 use std::collections::VecDeque;
 

@@ -1,4 +1,4 @@
-//! `--lora`: the gateway radio on a pseudo-terminal of its own.
+//! `--lora`: the gateway radio on a separate pseudo-terminal.
 
 use std::fs::{self, OpenOptions};
 use std::io::{Read, Write};

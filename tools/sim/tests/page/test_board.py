@@ -1,4 +1,4 @@
-"""Switch, power, modules, LEDs, both boards, and accessibility."""
+"""Switch, power, modules, LEDs, the boards with slots, and accessibility."""
 
 import pathlib
 import re

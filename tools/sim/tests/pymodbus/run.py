@@ -2,7 +2,7 @@
 simulator.
 
 `cargo xtask test` creates the virtual environment, sets the variables with the program and the images, and runs these
-tests, and with `--tests` those of the simulator's page. To run them directly:
+tests, and with `--tests` those of the simulator's page and of the commands in the documents. To run them directly:
 
     MODIO_SIM=target/debug/modio-sim MODIO_IMAGES_MODIO_02=target/thumbv7m-none-eabi/firmware python run.py
 """

@@ -97,7 +97,7 @@ impl Usart {
         }
     }
 
-    /// Returns the next instant at which something happens in the USART, caused by itself or by its wire.
+    /// Returns the next instant at which something happens in the USART, caused by the USART or by its wire.
     #[must_use]
     pub fn next_exchange(&self, wire: &dyn Wire) -> Option<Time> {
         let listens = self.awaits_start() || wire.has_edges();

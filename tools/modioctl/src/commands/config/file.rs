@@ -12,8 +12,12 @@ use toml::de::{DeTable, DeValue};
 
 use super::{Setting, of_modules};
 use crate::failure::Failure;
+use crate::input;
 use crate::names::{Book, Item, Meaning, is_module, port_of, slots};
 use crate::value::{parse, show, takes};
+
+/// The largest file that is read. The settings of a unit take some KiB.
+const MOST: u64 = 1 << 20;
 
 /// Returns the text of a file.
 pub fn text(book: &Book, items: &[Item], values: &[Vec<u16>]) -> Result<String, Failure> {
@@ -64,9 +68,22 @@ struct Line {
 /// wrong.
 pub fn read(book: &Book, path: &Path) -> Result<Vec<Setting>, Failure> {
     let shown = path.display().to_string();
-    let text = std::fs::read_to_string(path)
-        .map_err(|error| Failure::usage(format!("cannot read {shown}: {error}")))?;
-    check(book, &shown, &text)
+    let bytes = input::read(path, MOST)
+        .map_err(|what| Failure::usage(format!("cannot read {shown}: {what}")))?;
+    check(book, &shown, text_of(&shown, &bytes)?)
+}
+
+/// Returns the text in the bytes of a file.
+fn text_of<'a>(file: &str, bytes: &'a [u8]) -> Result<&'a str, Failure> {
+    let wrong = |what: &str| Failure::usage(format!("{file} {what}; nothing is written"));
+    if bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]) {
+        return Err(wrong(
+            "is UTF-16, as `>` of PowerShell writes it, and not UTF-8: write the file with `modioctl config export FILE`",
+        ));
+    }
+    let text = str::from_utf8(bytes).map_err(|_| wrong("is not a text in UTF-8"))?;
+    // Some editors begin a file with a byte order mark.
+    Ok(text.trim_start_matches('\u{FEFF}'))
 }
 
 fn check(book: &Book, file: &str, text: &str) -> Result<Vec<Setting>, Failure> {
@@ -90,6 +107,11 @@ fn check(book: &Book, file: &str, text: &str) -> Result<Vec<Setting>, Failure> {
         let number = lines.iter().find(format).map_or(1, |line| line.number);
         let text = "FORMAT with 7 data bits needs MODE = \"ASCII\"".to_owned();
         wrong.entry(number).or_insert(text);
+    }
+    if lines.is_empty() && wrong.is_empty() {
+        return Err(Failure::usage(format!(
+            "{file} has no setting; nothing is written"
+        )));
     }
     if wrong.is_empty() {
         return Ok(settings);
@@ -290,6 +312,35 @@ mod tests {
         // What settings the points have depends on the module.
         let wrong = checked("p5.1.filter = 4\np5.module = '5di'\np5.1.safe = 0").unwrap_err();
         assert!(wrong.starts_with("unit.toml, line 2: p5.module does not allow"));
+    }
+
+    #[test]
+    fn a_file_without_settings_is_refused() {
+        for text in ["", "# BAUD = 9600\n", "[p5]\n"] {
+            assert_eq!(
+                checked(text).unwrap_err(),
+                "unit.toml has no setting; nothing is written"
+            );
+        }
+    }
+
+    #[test]
+    fn a_file_in_utf_16_is_called_that_and_a_byte_order_mark_is_skipped() {
+        let of = |bytes: &[u8]| text_of("a", bytes).map(str::to_owned);
+        let text = "BAUD = 9600\n";
+        let units: Vec<u16> = std::iter::once(0xFEFF).chain(text.encode_utf16()).collect();
+        for bytes in [u16::to_be_bytes, u16::to_le_bytes] {
+            let bytes: Vec<u8> = units.iter().flat_map(|unit| bytes(*unit)).collect();
+            let text = of(&bytes).unwrap_err().to_string();
+            let why = "a is UTF-16, as `>` of PowerShell writes it";
+            assert!(text.starts_with(why), "{text}");
+        }
+        let text_of_latin_1 = of(b"NAME = \xE4").unwrap_err().to_string();
+        assert_eq!(
+            text_of_latin_1,
+            "a is not a text in UTF-8; nothing is written"
+        );
+        assert_eq!(of(b"\xEF\xBB\xBFBAUD = 9600\n").unwrap(), text);
     }
 
     #[test]

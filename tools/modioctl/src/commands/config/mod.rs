@@ -2,13 +2,13 @@
 
 mod file;
 
-use std::cell::RefCell;
 use std::io::{IsTerminal, Write as _, stderr, stdin};
 use std::path::Path;
 
 use register_map::codes::Command;
 use register_map::configuration;
 
+use super::note::{Note, Progress, UNDO};
 use super::read;
 use crate::cli::Config;
 use crate::device::{Device, fetch_set, with_modules};
@@ -21,9 +21,6 @@ use crate::value::show;
 const MOST: usize = 100;
 
 type Setting = (Item, Vec<u16>);
-
-/// Text that Ctrl-C prints: how much of the command is done.
-pub type Note = RefCell<String>;
 
 /// Reads and changes settings. When a name, a value or a file is wrong, nothing is written.
 pub async fn run(
@@ -46,16 +43,17 @@ pub async fn run(
                 .iter()
                 .map(|(name, value)| file::setting(&book, name, value))
                 .collect::<Result<Vec<_>, _>>()?;
+            let mut progress = Progress::of_settings(note, changes.len());
             device.unlock().await?;
-            Progress::new(note, changes.len())
-                .write(&mut device, &changes)
-                .await?;
+            write(&mut device, &changes, &mut progress).await?;
             output::line("written, but not saved: save with `modioctl config save`")?;
             device.warn_of_links(&changes).await
         }
         Config::Save => {
             device.unlock().await?;
-            device.save().await?;
+            note.during("the settings may be saved", "", device.save())
+                .await?;
+            note.set("the settings are saved");
             output::line("saved")?;
             tell_restart(&mut device).await
         }
@@ -76,8 +74,7 @@ pub async fn run(
             if !modules.is_empty() && !yes {
                 agree(&modules.join(", ")).await?;
             }
-            let mut progress = Progress::new(note, rows.len());
-            import(&mut device, &wanted, &file, &mut progress).await?;
+            import(&mut device, &wanted, &file, rows.len(), note).await?;
             device.warn_of_links(&wanted).await?;
             finish(device, restart).await
         }
@@ -87,10 +84,20 @@ pub async fn run(
             let changes = items.iter().zip(&values);
             let changes = changes.filter(|(item, words)| words[..] != [item.default]);
             device.warn_of_line(changes.map(|(item, _)| item.address));
-            device
-                .order(Command::LoadDefaults.code(), "loading the factory settings")
-                .await?;
-            device.save().await?;
+            let order = Command::LoadDefaults.code();
+            note.during(
+                format_args!("the factory settings may be in force{UNDO}"),
+                "nothing has changed",
+                device.order(order, "loading the factory settings"),
+            )
+            .await?;
+            note.during(
+                "the factory settings are in force, and may be saved: repeat the command",
+                format_args!("the factory settings are in force{UNDO}"),
+                device.save(),
+            )
+            .await?;
+            note.set("the factory settings are saved");
             output::line("the factory settings are saved")?;
             finish(device, restart).await
         }
@@ -109,39 +116,19 @@ async fn settings(device: &mut Device, book: &Book) -> Result<(Vec<Item>, Vec<Ve
     Ok((items, values))
 }
 
-/// Settings that are being written.
-struct Progress<'a> {
-    note: &'a Note,
-    done: usize,
-    all: usize,
-}
-
-impl<'a> Progress<'a> {
-    /// Begins to write this number of settings.
-    fn new(note: &'a Note, all: usize) -> Self {
-        let progress = Self { note, done: 0, all };
-        progress.show();
-        progress
+/// Writes settings that have been checked. The lock must be open.
+async fn write(
+    device: &mut Device,
+    changes: &[Setting],
+    progress: &mut Progress<'_>,
+) -> Result<(), Failure> {
+    device.warn_of_line(changes.iter().map(|(item, _)| item.address));
+    for (names, first, words) in runs(changes) {
+        let about = format!("writing {}", names.join(", "));
+        let request = device.write_words(first, &words, &about);
+        progress.write(names.len(), request).await?;
     }
-
-    fn show(&self) {
-        let Self { done, all, .. } = self;
-        self.note.replace(format!(
-            "{done} of {all} settings are written and nothing is saved: `modioctl reboot` brings the saved settings back"
-        ));
-    }
-
-    /// Writes settings that have been checked. The lock must be open.
-    async fn write(&mut self, device: &mut Device, changes: &[Setting]) -> Result<(), Failure> {
-        device.warn_of_line(changes.iter().map(|(item, _)| item.address));
-        for (names, first, words) in runs(changes) {
-            let about = format!("writing {}", names.join(", "));
-            device.write_words(first, &words, &about).await?;
-            self.done += names.len();
-            self.show();
-        }
-        Ok(())
-    }
+    Ok(())
 }
 
 /// Returns the requests that write these settings: names, first address and words. Modules are first, because a change
@@ -237,17 +224,19 @@ async fn agree(modules: &str) -> Result<(), Failure> {
     }
 }
 
-/// Writes the settings of a file that differ from those of the unit, and saves them.
+/// Writes the settings of a file that differ from those of the unit, about `count` of them, and saves them.
 async fn import(
     device: &mut Device,
     wanted: &[Setting],
     path: &Path,
-    progress: &mut Progress<'_>,
+    count: usize,
+    note: &Note,
 ) -> Result<(), Failure> {
+    let mut progress = Progress::of_settings(note, count);
     device.unlock().await?;
     let modules = wanted.iter().filter(|(item, _)| is_module(item));
     let modules = differing(device, &modules.cloned().collect::<Vec<_>>()).await?;
-    progress.write(device, &modules).await?;
+    write(device, &modules, &mut progress).await?;
     let mut changes = differing(device, wanted).await?;
     // FORMAT and MODE must be compatible, so write both or none.
     let line = configuration::FORMAT..=configuration::MODE;
@@ -259,11 +248,11 @@ async fn import(
         changes.extend(both.cloned());
     }
     progress.all = progress.done + changes.len();
-    progress.write(device, &changes).await?;
+    write(device, &changes, &mut progress).await?;
     let left = differing(device, wanted).await?;
     if let Some((item, _)) = left.first() {
         return Err(Failure::Refused(format!(
-            "{} does not have the written value; nothing is saved: see `modioctl config diff {}`",
+            "{} does not have the written value: see `modioctl config diff {}`",
             item.name,
             path.display()
         )));
@@ -273,12 +262,13 @@ async fn import(
     } else {
         output::line(format_args!("{} settings written", progress.done))?;
     }
-    progress.note.replace(
-        "all settings are written; whether they are saved is not known: repeat the import"
-            .to_owned(),
-    );
-    device.save().await?;
-    progress.note.replace("the settings are saved".to_owned());
+    note.during(
+        "all settings are written, and may be saved: repeat the import",
+        format_args!("all settings are written{UNDO}"),
+        device.save(),
+    )
+    .await?;
+    note.set("the settings are saved");
     output::line("saved")
 }
 

@@ -6,6 +6,7 @@ use modbus_line::names;
 use super::hex;
 use crate::bus::{Lost, Master, check_line};
 use crate::cli::Address;
+use crate::commands::note::Note;
 use crate::device::place;
 use crate::failure::Failure;
 use crate::output;
@@ -14,11 +15,18 @@ use crate::output;
 const UNIT: u16 = register_map::name::UNIT_BY_SERIAL;
 
 /// Sets the address of the unit with this serial number.
-pub async fn run(mut master: Master, options: &Address) -> Result<(), Failure> {
+pub async fn run(mut master: Master, options: &Address, note: &Note) -> Result<(), Failure> {
     check_line(master.endpoint())?;
     let (serial, unit) = (hex(options.serial), options.unit);
     let write = pdu(6, UNIT, unit.into());
-    match master.ask_serial(options.serial, &write).await {
+    note.set(format_args!(
+        "it may have address {unit} now: `modioctl scan --fast` shows the addresses"
+    ));
+    let result = master.ask_serial(options.serial, &write).await;
+    if result.is_ok() {
+        note.set("");
+    }
+    match result {
         Ok(reply) => match reply[..] {
             [_, 2] => Err(Failure::Refused(format!(
                 "unit {serial} has a switch for its address: for address {unit} set {} of SW01 to ON and all others to OFF, then switch the power off and on",
@@ -46,7 +54,7 @@ fn positions(unit: u8) -> String {
 
 fn failure(serial: &str, lost: &Lost, place: &str) -> Failure {
     match lost {
-        Lost::Silent => Failure::NoAnswer(format!(
+        Lost::Silent | Lost::Absent(_) => Failure::NoAnswer(format!(
             "unit {serial} does not answer at {place}: `modioctl scan --fast` lists the serial numbers of the units on the line"
         )),
         Lost::Garbled(_) => Failure::Garbled(format!(

@@ -104,7 +104,7 @@ async fn units(device: &mut Device) -> Result<Vec<u8>, Failure> {
 fn lost(device: &Device, lost: &Lost) -> Failure {
     let place = place(device.master.endpoint());
     match lost {
-        Lost::Silent => Failure::NoAnswer(format!(
+        Lost::Silent | Lost::Absent(_) => Failure::NoAnswer(format!(
             "no unit with Fast Modbus (function 70) answers at {place}: check power, wiring, rate and format; `modioctl scan` also finds units that do not have it"
         )),
         Lost::Garbled(_) => Failure::Garbled(format!(

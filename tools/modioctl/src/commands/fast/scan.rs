@@ -57,16 +57,16 @@ pub async fn run(
         .filter(is_rtu)
         .collect();
     let mut scanned = Scanned::default();
-    let complete = tokio::select! {
+    let result = tokio::select! {
         // Ctrl-C is handled before the scan begins.
         biased;
-        _ = tokio::signal::ctrl_c() => false,
-        result = search(lines, observer, &mut scanned) => {
-            result?;
-            true
-        }
+        _ = tokio::signal::ctrl_c() => Ok(false),
+        result = search(lines, observer, &mut scanned) => result.map(|()| true),
     };
-    print(&scanned, serial, json)?;
+    if result.is_ok() || !scanned.units.is_empty() {
+        print(&scanned, serial, json)?;
+    }
+    let complete = result?;
     match (scanned.units.is_empty(), scanned.garbled.is_empty()) {
         _ if !complete => Ok(false),
         (false, _) => Ok(true),
@@ -96,7 +96,8 @@ async fn search(
         master.change_line(line.clone())?;
         let before = scanned.units.len();
         let at = place(&line);
-        let lost = |error| Failure::Port(format!("{at} is lost ({error})"));
+        let lost =
+            |error| Failure::Port(format!("{at} is lost ({error}): the scan is not complete"));
         let mut scan = Scan::default();
         // Keep the units also when Ctrl-C ends the scan.
         while let Some(request) = scan.next() {
@@ -162,7 +163,7 @@ async fn identity(master: &mut Master, serial: u32) -> std::io::Result<String> {
 
 fn unread(lost: Lost) -> std::io::Result<String> {
     match lost {
-        Lost::Silent => Ok("no identification: no answer".to_owned()),
+        Lost::Silent | Lost::Absent(_) => Ok("no identification: no answer".to_owned()),
         Lost::Garbled(_) => Ok("no identification: a damaged answer".to_owned()),
         Lost::Broken(error) => Err(error),
     }

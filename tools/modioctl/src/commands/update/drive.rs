@@ -6,7 +6,7 @@ use chrono::Local;
 use tokio::time::{Instant, sleep_until};
 
 use super::progress::Progress;
-use crate::bus::{Lost, is_from_gateway};
+use crate::bus::{Lost, is_busy};
 use crate::cli::Watch;
 use crate::commands::watch::print;
 use crate::device::Device;
@@ -155,10 +155,9 @@ impl Drive<'_> {
             master.be_patient(timeout, retries);
         }
         match answer {
-            // A gateway answers for a unit that is silent.
-            Ok(answer) if matches!(answer[..], [_, code] if is_from_gateway(code)) => Ok(None),
+            Ok(answer) if is_busy(pdu, &answer) => Ok(None),
             Ok(answer) => Ok(Some(answer)),
-            Err(Lost::Silent | Lost::Garbled(_)) => Ok(None),
+            Err(Lost::Silent | Lost::Absent(_) | Lost::Garbled(_)) => Ok(None),
             Err(lost @ Lost::Broken(_)) => Err(self.device.lost(&lost)),
         }
     }

@@ -3,13 +3,15 @@
 mod drive;
 mod found;
 mod progress;
+mod record;
 mod report;
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
-use register_map::update::Slot;
+use register_map::update::{Reason, Slot};
 
-use super::config::Note;
+use super::note::Note;
 use super::watch::chosen;
 use crate::bus::adu::Framing;
 use crate::bus::{Endpoint, Observer};
@@ -20,6 +22,7 @@ use crate::update::{Campaign, Fault, File, Stage, Unit};
 use drive::{Drive, Poll};
 use found::{Found, look};
 use progress::Progress;
+use record::fault_record;
 use report::{Transfer, report, show_file, show_units};
 
 /// What is added to the time of the longest answer until a unit counts as silent for now.
@@ -58,6 +61,8 @@ pub async fn run(
         say_of_ended_keys(&found);
         return report_all(failed);
     }
+    let is_left_out =
+        |found: &Found, unit: &Unit| !options.force && found.loses_settings(unit.stage);
     let mut units = Vec::new();
     let mut ended_keys = Vec::new();
     for unit in &found {
@@ -66,14 +71,20 @@ pub async fn run(
                 let is_needed = fits.stage != Stage::Done;
                 if is_needed || options.end_first_key {
                     let ends = unit.ends_first_key(file, options.end_first_key)?;
-                    ended_keys.extend((ends && is_needed).then_some(unit.address));
+                    let takes_part = is_needed && !is_left_out(unit, &fits);
+                    ended_keys.extend((ends && takes_part).then_some(unit.address));
                 }
                 Ok(fits)
             }),
             None => unit.back(),
         };
         match fits {
-            Ok(unit) => units.push(unit),
+            Ok(mut fits) => {
+                if is_left_out(unit, &fits) {
+                    fits.stage = Stage::Failed(Fault::Unsaved);
+                }
+                units.push(fits);
+            }
             Err(what) => failed.push(Failure::Usage(format!("unit {} {what}", unit.address))),
         }
     }
@@ -99,7 +110,7 @@ pub async fn run(
     };
     // The rate of the line behind a server of Modbus TCP is not known, so broadcasts could be too fast.
     let unicast = options.unicast || endpoint.framing == Framing::Mbap;
-    "the same command goes on where it stopped".clone_into(&mut note.borrow_mut());
+    note.set("the same command goes on where it stopped");
     let mut drive = Drive {
         device: &mut device,
         little,
@@ -108,33 +119,71 @@ pub async fn run(
     };
     let mut transfers = Vec::new();
     let mut ended = Vec::new();
+    let mut broken = None;
     for units in groups(file.as_ref(), units) {
+        if broken.is_some() {
+            ended.extend(units);
+            continue;
+        }
         let slot = units.first().map_or(Slot::A, |unit| unit.target);
         let blocks = file.as_ref().map(|file| file.image(slot).blocks.as_slice());
         let mut campaign = Campaign::new(blocks.unwrap_or_default(), units, unicast);
         let result = drive.run(&mut campaign).await;
         drive.progress.clear();
-        transfers.push(Transfer {
-            times: result?,
-            blocks: blocks.map_or(0, <[_]>::len),
-            sent: campaign.blocks().0,
-            unicast: campaign.is_unicast(),
-        });
+        match result {
+            Ok(times) => transfers.push(Transfer {
+                times,
+                blocks: blocks.map_or(0, <[_]>::len),
+                sent: campaign.blocks().0,
+                unicast: campaign.is_unicast(),
+            }),
+            Err(failure) => broken = Some(failure),
+        }
         ended.extend_from_slice(campaign.units());
     }
-    note.borrow_mut().clear();
-    report(&found, &ended, &transfers, device.master.endpoint(), json)?;
-    report_all(ended.iter().filter_map(failure).collect())
+    let faults = faults(&mut device, &ended).await;
+    report(
+        &found,
+        &ended,
+        &faults,
+        &transfers,
+        device.master.endpoint(),
+        json,
+    )?;
+    let failures = ended.iter().filter_map(|unit| failure(unit, &faults));
+    let failures = failures.collect();
+    if let Some(broken) = broken {
+        show_all(failures);
+        return Err(broken);
+    }
+    note.set("");
+    report_all(failures)
+}
+
+/// Returns why units were not updated, by address.
+async fn faults(device: &mut Device, units: &[Unit]) -> BTreeMap<u8, String> {
+    let mut faults = BTreeMap::new();
+    for unit in units {
+        let Stage::Failed(fault) = unit.stage else {
+            continue;
+        };
+        let mut text = fault.to_string();
+        if fault == Fault::Rejected(Reason::NotConfirmed)
+            && let Ok(record) = fault_record(device, unit.address).await
+        {
+            text = format!("{text}; {record}");
+        }
+        faults.insert(unit.address, text);
+    }
+    faults
 }
 
 /// Returns the failure of a unit that was not updated.
-fn failure(unit: &Unit) -> Option<Failure> {
-    let Stage::Failed(fault) = unit.stage else {
-        return None;
-    };
-    let text = format!("unit {} {fault}", unit.address);
-    Some(match fault {
-        Fault::Silent => Failure::NoAnswer(text),
+fn failure(unit: &Unit, faults: &BTreeMap<u8, String>) -> Option<Failure> {
+    let text = faults.get(&unit.address)?;
+    let text = format!("unit {} {text}", unit.address);
+    Some(match unit.stage {
+        Stage::Failed(Fault::Silent) => Failure::NoAnswer(text),
         _ => Failure::Refused(text),
     })
 }
@@ -167,10 +216,14 @@ fn report_all(mut failed: Vec<Failure>) -> Result<(), Failure> {
     // The exit status is 1 if any unit refuses.
     failed.sort_by_key(|failure| std::cmp::Reverse(failure.status()));
     let last = failed.pop();
+    show_all(failed);
+    last.map_or(Ok(()), Err)
+}
+
+fn show_all(failed: Vec<Failure>) {
     for failure in failed {
         eprintln!("modioctl: {failure}");
     }
-    last.map_or(Ok(()), Err)
 }
 
 /// Reports in one line which units accept a development key.

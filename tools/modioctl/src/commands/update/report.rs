@@ -1,5 +1,7 @@
 //! What `modioctl update` prints on standard output.
 
+use std::collections::BTreeMap;
+
 use register_map::state;
 use register_map::update::BLOCK_BYTES;
 use serde_json::{Value as Json, json};
@@ -140,6 +142,7 @@ pub fn show_units(found: &[Found], json: bool) -> Result<(), Failure> {
 pub fn report(
     found: &[Found],
     ended: &[Unit],
+    faults: &BTreeMap<u8, String>,
     transfers: &[Transfer],
     line: &Endpoint,
     json: bool,
@@ -151,6 +154,7 @@ pub fn report(
         };
         let result = match unit.stage {
             Stage::Failed(_) => "failed",
+            stage if stage != Stage::Done => "not finished",
             _ if unit.target == found.status.slot && !found.trial => "runs it already",
             _ => "confirmed",
         };
@@ -168,10 +172,7 @@ pub fn report(
     if json {
         let units = rows.iter().map(|(unit, before, after, slot, result)| {
             let (slot, result) = (format!("{slot:?}"), *result);
-            let failure = ended.iter().find_map(|ended| match ended.stage {
-                Stage::Failed(fault) if ended.address == *unit => Some(fault.to_string()),
-                _ => None,
-            });
+            let failure = faults.get(unit);
             json!({
                 "unit": unit, "before": before, "after": after, "slot": slot, "result": result, "failure": failure,
             })
@@ -182,6 +183,7 @@ pub fn report(
     for (unit, before, after, slot, result) in rows {
         let change = match result {
             "failed" => format!("{before}, not updated to {after}"),
+            "not finished" => format!("{before}, the update to {after} is not finished"),
             "runs it already" => format!("{after} in slot {slot:?}, it runs that already"),
             _ => format!("{before} -> {after} in slot {slot:?}, confirmed"),
         };

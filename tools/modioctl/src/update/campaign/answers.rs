@@ -145,7 +145,7 @@ impl Campaign {
                     self.queue
                         .push_front(Action::Unlock(index, Command::Confirm));
                 } else {
-                    unit.fail(Fault::OtherImage);
+                    unit.is_another();
                 }
             }
             (Action::Confirmed(_), _) => {

@@ -4,6 +4,7 @@ mod bus;
 mod model;
 pub(super) mod sample;
 
+use register_map::codes::Command;
 use register_map::update::{Reason, Slot, State};
 
 use super::file::File;
@@ -183,6 +184,73 @@ fn a_wrong_crc_is_repaired_once_and_a_rejected_image_is_reported() {
     assert_eq!(stages(&campaign), [Stage::Done, rejected, Stage::Done]);
     let text = Fault::Rejected(Reason::Signature).to_string();
     assert!(text.contains("signature is not by a key"), "{text}");
+}
+
+#[test]
+fn only_an_image_whose_check_was_interrupted_is_started_again_and_only_once() {
+    for (reason, starts) in [(Reason::Interrupted, 2), (Reason::NotConfirmed, 1)] {
+        let mut bus = Bus::new(115_200, 1);
+        bus.units[0].flaw = Flaw::Rejects(reason);
+        let campaign = update(&mut bus, false);
+        let rejected = Stage::Failed(Fault::Rejected(reason));
+        assert_eq!(stages(&campaign), [rejected]);
+        let orders = bus.units[0].orders.iter();
+        let finishes = orders.filter(|order| **order == Command::Finish);
+        assert_eq!(finishes.count(), starts, "{reason:?}");
+    }
+}
+
+/// The blocks of the other program are the same ones here.
+#[test]
+fn a_unit_that_another_program_has_updated_is_done_and_is_not_prepared_again() {
+    // The unit is away for less time than until it is given up, and for more.
+    for restart in [1, 9] {
+        let file = of_blocks(BLOCKS);
+        let mut bus = Bus::new(115_200, 1);
+        bus.units[0].flaw = Flaw::UpdatedAfter(200);
+        bus.units[0].restart = std::time::Duration::from_secs(restart);
+        let units = units(&bus, &file, Stage::Waiting);
+        let mut campaign = Campaign::new(&file.image(Slot::B).blocks, units, false);
+        bus.run(&mut campaign);
+        assert_eq!(stages(&campaign), [Stage::Done], "{restart} s");
+        let orders = [Command::Prepare, Command::Confirm];
+        assert_eq!(bus.units[0].orders, orders, "{restart} s");
+    }
+}
+
+#[test]
+fn a_unit_that_comes_back_is_updated_and_has_all_the_time_to_restart() {
+    let mut bus = Bus::new(115_200, 1);
+    bus.units[0].flaw = Flaw::AwayAfter(200);
+    bus.units[0].restart = std::time::Duration::from_secs(15);
+    let campaign = update(&mut bus, false);
+    assert_eq!(stages(&campaign), [Stage::Done]);
+}
+
+#[test]
+fn a_slot_that_has_aged_gets_one_order_to_go_back() {
+    let mut bus = Bus::new(9600, 1);
+    let older = [0x0002, 0, 0, 7, 8, 200, 0, 0];
+    let unit = &mut bus.units[0];
+    (unit.state, unit.flaw, unit.images[1]) = (State::Confirmed, Flaw::Rotten, older);
+    let mut campaign = Campaign::new(&[], vec![Unit::back(1, Slot::B, older)], false);
+    bus.run(&mut campaign);
+    assert_eq!(stages(&campaign), [Stage::Failed(Fault::Aged)]);
+    assert_eq!(bus.units[0].orders, [Command::GoBack]);
+}
+
+/// The image crashes when it is asked for its version, so the unit goes back before the image is confirmed.
+#[test]
+fn a_unit_that_goes_back_before_it_is_confirmed_reports_why() {
+    let file = of_blocks(20);
+    let image = file.image(Slot::B);
+    let unit = Unit::new(1, Slot::B, image.words, Stage::OnTrial);
+    let mut campaign = Campaign::new(&image.blocks, vec![unit], false);
+    let mut bus = Bus::new(115_200, 1);
+    bus.units[0].state = State::Rejected(Reason::NotConfirmed);
+    bus.run(&mut campaign);
+    let rejected = Stage::Failed(Fault::Rejected(Reason::NotConfirmed));
+    assert_eq!(stages(&campaign), [rejected]);
 }
 
 #[test]

@@ -5,8 +5,10 @@ use std::time::Duration;
 use register_map::board::MODIO_02;
 use register_map::codes::Command;
 use register_map::configuration::{COMMAND, KEY, OPENING_KEY};
-use register_map::state::{BOARD, BUILD, COMMIT, FIRMWARE_VERSION, PRODUCT, PRODUCT_CODE, UPDATE};
-use register_map::update::{BLOCK_BYTES, Header, Slot, State, block_at};
+use register_map::state::{
+    BOARD, BUILD, COMMIT, FIRMWARE_VERSION, PRODUCT, PRODUCT_CODE, STATUS, UPDATE,
+};
+use register_map::update::{BLOCK_BYTES, Header, Reason, Slot, State, block_at};
 
 /// Time in which a block is programmed.
 const BLOCK: Duration = Duration::from_millis(5);
@@ -21,10 +23,16 @@ pub enum Flaw {
     RestartsAfter(usize),
     /// It is gone when it has received this many blocks.
     GoneAfter(usize),
+    /// It does not answer for 9 s when it has received this many blocks.
+    AwayAfter(usize),
     /// It finds a wrong CRC-32 once.
     WrongCrc,
+    /// Another program has updated it when it has received this many blocks.
+    UpdatedAfter(usize),
+    /// The confirmed image in its other slot has aged: its CRC-32 is wrong.
+    Rotten,
     /// It rejects the image.
-    Rejects(register_map::update::Reason),
+    Rejects(Reason),
     /// It answers broadcasts, as devices of some makers do.
     AnswersBroadcasts,
     /// It carries out the order to confirm only the second time.
@@ -58,6 +66,10 @@ pub struct Model {
     pub page: Duration,
     /// Time from the order to start an image until it answers.
     pub restart: Duration,
+    /// The orders that it was given, but for those that it refused because its lock was closed.
+    pub orders: Vec<Command>,
+    /// Register STATUS.
+    pub status: u16,
     reason: u16,
     is_open: bool,
     erased_at: Duration,
@@ -87,6 +99,8 @@ impl Model {
             floor: 0,
             page: Duration::from_millis(50),
             restart: Duration::from_secs(3),
+            orders: Vec::new(),
+            status: 0,
             reason: 0,
             is_open: false,
             erased_at: Duration::ZERO,
@@ -223,6 +237,13 @@ impl Model {
             Flaw::GoneAfter(blocks) if self.received == blocks => {
                 self.silent_until = Duration::MAX;
             }
+            Flaw::AwayAfter(blocks) if self.received == blocks => {
+                self.silent_until = now + Duration::from_secs(9);
+            }
+            Flaw::UpdatedAfter(blocks) if self.received == blocks => {
+                self.switch(now);
+                self.trial = false;
+            }
             _ => {}
         }
         Ok(pdu.to_vec())
@@ -236,8 +257,17 @@ impl Model {
         }
         assert_eq!(address, COMMAND);
         let is_whole = self.blocks > 0 && self.content.iter().all(Option::is_some);
-        match Command::from_code(word).unwrap() {
-            _ if !self.is_open => return Err(6),
+        let may_finish = match self.state {
+            State::Receiving => is_whole,
+            State::Rejected(Reason::Interrupted | Reason::NotConfirmed) => true,
+            _ => false,
+        };
+        let command = Command::from_code(word).unwrap();
+        if !self.is_open {
+            return Err(6);
+        }
+        self.orders.push(command);
+        match command {
             Command::Prepare if !self.trial => {
                 self.state = State::Receiving;
                 self.erased_at = now + PAGES * self.page;
@@ -245,7 +275,7 @@ impl Model {
                 self.content.clear();
                 self.reason = 0;
             }
-            Command::Finish if self.state == State::Receiving && is_whole => match self.flaw {
+            Command::Finish if may_finish => match self.flaw {
                 Flaw::WrongCrc => {
                     self.flaw = Flaw::None;
                     self.reason = 6;
@@ -257,10 +287,13 @@ impl Model {
                 }
                 _ if !self.takes_key_of(1) => {
                     self.silent_until = now + self.restart;
-                    self.state = State::Rejected(register_map::update::Reason::Signature);
+                    self.state = State::Rejected(Reason::Signature);
                 }
                 _ => self.switch(now),
             },
+            Command::GoBack if self.state == State::Confirmed && self.flaw == Flaw::Rotten => {
+                self.reason = Reason::Crc as u16;
+            }
             Command::GoBack if self.state == State::Confirmed && self.takes_key_of(1) => {
                 self.switch(now);
             }
@@ -294,6 +327,7 @@ impl Model {
             FIRMWARE_VERSION => version,
             0x0203 => patch,
             BOARD => MODIO_02.code,
+            STATUS => self.status,
             COMMIT => high,
             0x020D => low,
             BUILD => u16::from(self.development) << 3,

@@ -23,10 +23,12 @@ pub fn signed(mut image: Vec<u8>, key: u32) -> Vec<u8> {
     image
 }
 
-/// Returns the image with its CRC-32.
+/// Returns the image with its SHA-512 and its CRC-32.
 pub fn sealed(mut image: Vec<u8>) -> Vec<u8> {
     let crc = crc32([&image[..20], &image[512..]]);
     image[20..24].copy_from_slice(&crc.to_le_bytes());
+    let hash = Sha512::digest(&image[512..]);
+    image[28..92].copy_from_slice(&hash);
     image
 }
 

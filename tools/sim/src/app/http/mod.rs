@@ -120,7 +120,7 @@ impl Server {
         if self.events.send(Event::Request(request, reply)).is_err() {
             return stopping();
         }
-        // A task of its own keeps the place until the boards' thread has replied. When the client disconnects, this
+        // A separate task keeps the place until the boards' thread has replied. When the client disconnects, this
         // function ends earlier.
         let answered = tokio::spawn(async move {
             let reply = answer.await;

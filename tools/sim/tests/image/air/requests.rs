@@ -28,7 +28,7 @@ fn each_line_has_its_own_counters_which_both_lines_show() {
     assert_eq!(on_air[..4], [6, 1, 1, 5]);
     let line = bench.read_over_the_air(state::BUS_MESSAGES, 4);
     assert_eq!(line, [1, 0, 0, 1]);
-    // Function 08 answers with the counters of its own line.
+    // Function 08 returns the counters of the line that received the request.
     let messages = bench.ask_over_the_air(1, &[8, 0, 0x0B, 0, 0]);
     assert_eq!(messages, Some(vec![8, 0, 0x0B, 0, 8]));
     assert_eq!(bench.request(&[8, 0, 0x0B, 0, 0]), Ok(vec![0, 0x0B, 0, 2]));

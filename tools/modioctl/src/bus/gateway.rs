@@ -1,0 +1,130 @@
+//! Gateways from Modbus TCP to a serial line.
+
+use std::io;
+use std::time::Duration;
+
+use tokio::time::Instant;
+
+use super::Found;
+use super::master::{Lost, MOST, Master, PROBE};
+
+/// Number of time-outs for which late answers are waited for at the end of a sweep.
+const BACKLOG: u32 = 3;
+
+/// Returns whether an exception is the answer of a gateway for a unit that does not answer it (V1.1b3 chapter 7, codes
+/// 0A and 0B).
+pub const fn is_from_gateway(code: u8) -> bool {
+    matches!(code, 0x0A | 0x0B)
+}
+
+/// Returns whether an answer to a read is exception 05 or 06: the unit, or a gateway, has no time for it now. To a write
+/// these exceptions can mean more.
+pub const fn is_busy(pdu: &[u8], answer: &[u8]) -> bool {
+    let is_read = matches!(
+        pdu,
+        [0x01..=0x04 | 0x07 | 0x0B | 0x0C | 0x11 | 0x14 | 0x18, ..] | [0x2B, 0x0E, ..]
+    );
+    is_read && matches!(answer, [0x80..=0xFF, 5 | 6])
+}
+
+/// Returns a time-out in seconds for a gateway that took this time for an answer.
+pub fn sufficient(time: Duration) -> u64 {
+    (time + Duration::from_millis(200)).as_secs() + 1
+}
+
+impl Master {
+    /// Asks these addresses over Modbus TCP. A unit is what answers function 03, which every gateway passes. When the
+    /// gateway answers later than the time-out, its answers are waited for, and the addresses concerned are asked again.
+    /// Calls `asked` with each address before its first request.
+    pub async fn sweep_gateway(
+        &mut self,
+        units: &[u8],
+        found: &mut Found,
+        mut asked: impl FnMut(u8),
+    ) -> io::Result<()> {
+        let mut silent = Vec::new();
+        let mut busy = Vec::new();
+        let usual = self.be_patient(self.endpoint().timeout, 0);
+        for unit in units {
+            asked(*unit);
+            match self.ask(*unit, &PROBE).await {
+                Ok(answer) if is_busy(&PROBE, &answer) => busy.push(*unit),
+                Err(Lost::Silent) => silent.push(*unit),
+                answer => found.answered_gateway(*unit, answer)?,
+            }
+            if found.never_silent {
+                break;
+            }
+        }
+        self.be_patient(usual.0, usual.1);
+        if found.never_silent {
+            return Ok(());
+        }
+        self.wait_for_late().await?;
+        if self.lateness() > Duration::ZERO {
+            busy.extend(silent);
+        }
+        for unit in busy {
+            match self.ask(unit, &PROBE).await {
+                Ok(answer) if is_busy(&PROBE, &answer) => {
+                    found.busy.insert(unit);
+                }
+                answer => found.answered_gateway(unit, answer)?,
+            }
+        }
+        Ok(())
+    }
+
+    /// Waits for the answers that are late.
+    async fn wait_for_late(&mut self) -> io::Result<()> {
+        let mut got = Vec::new();
+        let wait = |master: &Self| Instant::now() + BACKLOG * master.patience();
+        let mut until = wait(self);
+        while self.late.is_expected()
+            && got.len() < MOST
+            && self.read_until(until, &mut got).await? > 0
+        {
+            if self.take_late(&mut got, None) {
+                until = wait(self);
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Found {
+    /// Takes the answer of a gateway for this address.
+    fn answered_gateway(&mut self, unit: u8, answer: Result<Vec<u8>, Lost>) -> io::Result<()> {
+        match answer {
+            Ok(_) => {
+                self.units.insert(unit);
+            }
+            Err(Lost::Garbled(bytes)) if bytes.len() >= MOST => self.never_silent = true,
+            Err(Lost::Garbled(_)) => {
+                self.garbled.insert(unit);
+            }
+            Err(Lost::Silent | Lost::Absent(_)) => {}
+            Err(Lost::Broken(error)) => return Err(error),
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sufficient_time_is_longer_than_the_answers_took() {
+        let seconds = [250, 1_990, 2_003, 3_000].map(|ms| sufficient(Duration::from_millis(ms)));
+        assert_eq!(seconds, [1, 3, 3, 4]);
+    }
+
+    #[test]
+    fn only_a_read_can_be_repeated_while_the_unit_is_busy() {
+        assert!(is_busy(&[3, 0, 0, 0, 1], &[0x83, 6]));
+        assert!(is_busy(&[0x2B, 0x0E, 1, 0], &[0xAB, 5]));
+        assert!(!is_busy(&[6, 1, 0, 0, 1], &[0x86, 6]), "a write");
+        assert!(!is_busy(&[3, 0, 0, 0, 1], &[0x83, 2]));
+    }
+}

@@ -1,0 +1,233 @@
+//! Tests with gateways, and with units that answer late.
+
+use std::net::SocketAddr;
+use std::sync::{Arc, Mutex};
+use std::thread;
+use std::time::Duration;
+
+use modbus_reference::Server;
+use modioctl::bus::adu::{Framing, pdu, words_of};
+use modioctl::bus::{Endpoint, Lost, Master, Place};
+use register_map::Module;
+use register_map::state::UPDATE;
+
+use crate::gateway::Gateway;
+use crate::program::{At, has};
+use crate::served::{modio_02, response, serve_requests, server};
+
+const MS: Duration = Duration::from_millis(1);
+
+/// Serves these units over TCP with RTU frames.
+fn units(addresses: &'static [u8]) -> SocketAddr {
+    let mut server = modio();
+    serve_requests(move |unit, pdu| {
+        Some(match addresses.contains(&unit) {
+            true => response(&mut server, unit, pdu),
+            false => Vec::new(),
+        })
+    })
+}
+
+/// Returns a modio-02 with a loader.
+fn modio() -> Server {
+    server(modio_02(Module::Di4).into_iter().chain([(UPDATE, 1)]))
+}
+
+#[test]
+fn exceptions_0a_and_0b_are_asked_again_on_every_line() {
+    for code in [0x0A, 0x0B] {
+        let mut server = modio();
+        let mut requests = 0;
+        let line = serve_requests(move |unit, pdu| {
+            requests += 1;
+            Some(match requests % 3 {
+                0 => response(&mut server, unit, pdu),
+                _ => Framing::Rtu.frame(0, unit, &[pdu[0] | 0x80, code]),
+            })
+        });
+        for at in [
+            At::tcp(line),
+            At::modbus_tcp(Gateway::default().before(line)),
+        ] {
+            let text = at.run("read p5.1 FORMAT --raw").fine();
+            assert_eq!(text, "p5.1    0\nFORMAT  0\n");
+        }
+    }
+}
+
+#[test]
+fn a_unit_that_no_try_finds_behind_a_gateway_is_status_3() {
+    let requests = Arc::new(Mutex::new(0));
+    let count = Arc::clone(&requests);
+    let line = serve_requests(move |_, _| {
+        *count.lock().unwrap() += 1;
+        Some(Vec::new())
+    });
+    let wait = 30 * MS;
+    let gateway = Gateway {
+        wait,
+        ..Gateway::default()
+    };
+    let text = At::modbus_tcp(gateway.before(line)).run("read 0").failed(3);
+    has(
+        &text,
+        &["unit 1 does not answer the gateway", "exception 0B"],
+    );
+    assert_eq!(*requests.lock().unwrap(), 3, "one request and two retries");
+}
+
+#[test]
+fn a_read_is_repeated_while_the_unit_or_the_gateway_is_busy() {
+    for code in [5, 6] {
+        let busy = Gateway {
+            busy: Some(code),
+            ..Gateway::default()
+        };
+        let at = At::modbus_tcp(busy.before(units(&[1])));
+        assert_eq!(at.run("read p5.1").fine(), "p5.1  off\n", "{code:02X}");
+        let always = serve_requests(move |unit, pdu| {
+            Some(Framing::Rtu.frame(0, unit, &[pdu[0] | 0x80, code]))
+        });
+        for words in ["read p5.1", "update --status"] {
+            let text = At::tcp(always)
+                .run(&format!("--retries 1 {words}"))
+                .failed(1);
+            has(&text, &["unit 1", "busy", "again"]);
+            assert!(!text.contains("not a modio"), "{text}");
+        }
+    }
+}
+
+/// Each absent unit costs the gateway more than the time-out, so the answers to later requests are late as well.
+#[test]
+fn a_scan_waits_for_the_late_answers_of_a_gateway() {
+    for healthy in [&[2, 5, 6][..], &[]] {
+        let wait = 200 * MS;
+        let gateway = Gateway {
+            wait,
+            ..Gateway::default()
+        };
+        let at = At::modbus_tcp(gateway.before(units(healthy)));
+        let ran = at.run("--timeout 100ms scan --units 1-6");
+        let found = ran.out.lines().map(|line| line[..1].parse().unwrap());
+        assert_eq!(found.collect::<Vec<u8>>(), healthy, "{ran:?}");
+        assert_eq!(ran.status, 3, "{ran:?}");
+        has(&ran.err, &["the gateway answers late: --timeout 1s"]);
+    }
+}
+
+#[test]
+fn a_gateway_that_passes_only_standard_functions_creates_no_units() {
+    let wait = 20 * MS;
+    let gateway = Gateway {
+        only_standard: true,
+        wait,
+        ..Gateway::default()
+    };
+    let at = At::modbus_tcp(gateway.before(units(&[3])));
+    let text = at.run("scan --units 1-5").fine();
+    assert_eq!(text.lines().count(), 1, "{text}");
+    assert!(text.starts_with("3  "), "{text}");
+}
+
+/// Gateways that speak RTU answer for a missing unit as those for Modbus TCP do.
+#[test]
+fn a_gateway_with_rtu_frames_that_passes_only_standard_functions_creates_no_units() {
+    let mut server = modio();
+    let line = serve_requests(move |unit, pdu| {
+        Some(match (unit, pdu[0]) {
+            (3, 1..=7) => response(&mut server, unit, pdu),
+            (_, 1..=7) => Framing::Rtu.frame(0, unit, &[pdu[0] | 0x80, 0x0B]),
+            _ => Framing::Rtu.frame(0, unit, &[pdu[0] | 0x80, 1]),
+        })
+    });
+    let text = At::tcp(line).run("scan --units 1-5").fine();
+    assert!(
+        text.starts_with("3  ") && text.lines().count() == 1,
+        "{text}"
+    );
+}
+
+#[test]
+fn a_unit_has_a_loader_when_its_register_says_so() {
+    let gateway = Gateway {
+        only_standard: true,
+        ..Gateway::default()
+    };
+    let at = At::modbus_tcp(gateway.before(units(&[1])));
+    let text = at.run("update --status").failed(1);
+    has(&text, &["unit 1", "function 14", "gateway"]);
+    assert!(!text.contains("no loader"), "{text}");
+}
+
+#[test]
+fn a_gateway_with_its_own_transaction_ids_is_status_4_and_creates_no_units() {
+    let gateway = Gateway {
+        own_ids: true,
+        ..Gateway::default()
+    };
+    let at = At::modbus_tcp(gateway.before(units(&[1])));
+    let ran = at.run("--timeout 50ms scan --units 1-3");
+    assert_eq!(ran.status, 4, "{ran:?}");
+    assert!(
+        !ran.out
+            .lines()
+            .any(|line| line.starts_with(char::is_numeric)),
+        "{ran:?}"
+    );
+}
+
+/// Reads two registers in turn from a unit that needs longer than the time-out for some answers. The value of each
+/// register is its address.
+#[track_caller]
+fn read_in_turn(place: Place, framing: Framing, retries: u8) {
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .unwrap();
+    runtime.block_on(async {
+        let endpoint = Endpoint {
+            timeout: 40 * MS,
+            retries,
+            baud: 921_600,
+            ..Endpoint::new(place, framing)
+        };
+        let mut master = Master::open(endpoint, None).await.unwrap();
+        let mut answered = 0;
+        for n in 0..24 {
+            let address = [0x10, 0x20][n % 2];
+            match master.ask(1, &pdu(3, address, 1)).await {
+                Ok(answer) => {
+                    assert_eq!(words_of(&answer), [address], "{framing:?}, read {n}");
+                    answered += 1;
+                }
+                Err(Lost::Silent) => {}
+                Err(lost) => panic!("{framing:?}, read {n}: {lost:?}"),
+            }
+        }
+        assert!(answered > 5, "{framing:?}: {answered}");
+    });
+}
+
+#[test]
+fn a_late_answer_is_never_mistaken_for_the_answer_to_another_request() {
+    for framing in [Framing::Rtu, Framing::Mbap] {
+        // `monitor` sends each request once.
+        for retries in [0, 2] {
+            let mut server = server((0..0x30).map(|n| (n, n)));
+            let mut random = fastrand::Rng::with_seed(1);
+            let line = serve_requests(move |unit, pdu| {
+                // Often twice in succession.
+                if random.bool() {
+                    thread::sleep(MS * random.u32(50..70));
+                }
+                Some(response(&mut server, unit, pdu))
+            });
+            let place = match framing {
+                Framing::Mbap => Place::ModbusTcp(Gateway::default().before(line).to_string()),
+                _ => Place::Tcp(line.to_string()),
+            };
+            read_in_turn(place, framing, retries);
+        }
+    }
+}
