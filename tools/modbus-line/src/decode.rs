@@ -1,6 +1,7 @@
 //! Describes requests and responses in words, for people.
 
 use crate::adu::{Framing, RTU_MOST, bytes};
+use crate::other::wrong_count;
 use crate::{Direction, fast, names};
 
 /// Describes a frame in words: the unit, and the request or response. `request` is the PDU of the preceding
@@ -133,6 +134,9 @@ pub fn response(pdu: &[u8], request: Option<&[u8]>) -> String {
         return format!("{name}: exception {reason:02X}, {why}");
     }
     let request = request.filter(|request| request.first() == Some(code));
+    if let Some(wrong) = request.and_then(|request| wrong_count(request, pdu)) {
+        return format!("{}, {wrong}", with_rest(&name, pdu));
+    }
     answered(*code, pdu, request)
         .map_or_else(|| with_rest(&name, pdu), |text| format!("{name} {text}"))
 }
@@ -325,6 +329,18 @@ mod tests {
         );
         let file = [0x14, 7, 6, 0, 1, 0, 0, 0, 2];
         assert_eq!(request(&file), "read file record file 1, records 0 x 2");
+    }
+
+    #[test]
+    fn read_of_one_bit_shows_one_bit_and_names_a_wrong_byte_count() {
+        let asked = Some(&[1, 0, 0x10, 0, 1][..]);
+        assert_eq!(response(&[1, 1, 0xFF], asked), "read coils 0x0010 = 1");
+        assert_eq!(response(&[1, 1, 0xFE], asked), "read coils 0x0010 = 0");
+        let long = "read coils: 02 01 00, its byte count is 2, and 1 is right";
+        assert_eq!(response(&[1, 2, 1, 0], asked), long);
+        let words = Some(&[3, 0, 0x10, 0, 2][..]);
+        let short = "read holding registers: 02 00 05, its byte count is 2, and 4 is right";
+        assert_eq!(response(&[3, 2, 0, 5], words), short);
     }
 
     #[test]

@@ -31,6 +31,7 @@ pub mod exact;
 pub mod fast;
 mod format;
 pub mod names;
+pub mod other;
 #[cfg(feature = "port")]
 pub mod port;
 mod waiting;

@@ -3,7 +3,7 @@
 use crate::adu::{Framing, response_length};
 
 /// Number of bytes in front of an answer that are tolerated: a driver that is switched on can create them.
-const NOISE: usize = 3;
+pub(crate) const NOISE: usize = 3;
 
 /// A request that waits for its answer.
 #[derive(Debug)]

@@ -306,16 +306,16 @@ pub struct Watch {
     /// Interval between values
     #[arg(long, value_name = "TIME", default_value = "1s", value_parser = duration)]
     pub every: Duration,
-    /// Print CSV, for spreadsheets
+    /// Print CSV, for spreadsheets. While the unit does not answer, rows have no values
     #[arg(long, conflicts_with = "json_lines")]
     pub csv: bool,
-    /// Print one JSON object per line
+    /// Print one JSON object per line. While the unit does not answer, values are null
     #[arg(long)]
     pub json_lines: bool,
     /// Print raw numbers as in the registers
     #[arg(long)]
     pub raw: bool,
-    /// Number of times to print the values
+    /// Number of times to print the values. Rows without values do not count
     #[arg(long, value_name = "N", value_parser = times)]
     pub count: Option<u64>,
 }

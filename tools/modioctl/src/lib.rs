@@ -5,6 +5,16 @@
 
 #![forbid(unsafe_code)]
 
+/// Prints a line on standard error, in place of the macro of the standard library, which panics when standard error is
+/// closed. Nobody reads the line then, and the command goes on.
+macro_rules! eprintln {
+    ($($text:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stderr(), $($text)*);
+    }};
+}
+
+mod adapter;
 pub mod bus;
 pub mod cli;
 mod commands;
@@ -22,5 +32,6 @@ mod sniff;
 mod trace;
 pub mod update;
 mod value;
+mod warnings;
 
 pub use commands::run;

@@ -196,9 +196,8 @@ pub fn note(book: &Book, order: &Order) -> Option<String> {
     let (name, output) = (&source.name, &order.output);
     let wants_safe = format!("the link wants what {output}.safe says");
     Some(match Signal::from_code(reading.range)? {
-        Signal::Voltage => format!(
-            "{name} is 0-10 V, which has no wire-break detection: for the link a cut wire is a voltage"
-        ),
+        // `warnings::of_links` warns of it.
+        Signal::Voltage => return None,
         Signal::Current => format!(
             "while the loop of {name} is broken, {wants_safe}; a loop that fails high reads as above HIGH"
         ),

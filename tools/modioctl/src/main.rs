@@ -1,5 +1,7 @@
 //! The program.
 
+use std::fmt::Display;
+use std::io::{Write as _, stderr};
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
@@ -19,7 +21,7 @@ fn main() -> ExitCode {
             | ErrorKind::DisplayVersion
             | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => error.exit(),
             _ => {
-                eprintln!("modioctl: {}", one_line(&error));
+                complain(one_line(&error));
                 return ExitCode::from(Failure::usage("").status());
             }
         },
@@ -30,15 +32,20 @@ fn main() -> ExitCode {
     let result = match runtime {
         Ok(runtime) => runtime.block_on(modioctl::run(cli)),
         Err(error) => {
-            eprintln!("modioctl: the system provides no timers: {error}");
+            complain(format_args!("the system provides no timers: {error}"));
             return ExitCode::FAILURE;
         }
     };
     match result {
         Ok(code) => code,
         Err(failure) => {
-            eprintln!("modioctl: {failure}");
+            complain(&failure);
             ExitCode::from(failure.status())
         }
     }
+}
+
+/// Prints an error. The exit status stays the same when standard error is closed.
+fn complain(text: impl Display) {
+    let _ = writeln!(stderr(), "modioctl: {text}");
 }

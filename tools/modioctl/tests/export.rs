@@ -274,6 +274,34 @@ fn lines_with_names_have_no_ids_in_common() {
     assert_eq!(all.len(), 3 * ids(None).len());
 }
 
+/// Readers of YAML 1.1, as Home Assistant has, take these for a boolean and for numbers, unless they are quoted.
+#[test]
+fn every_text_in_yaml_is_quoted() {
+    let book = analog();
+    for name in ["yes", "1.0", "1_000"] {
+        let yaml = several(HomeAssistant, Some(name), &[(1, &book)], &serial()).unwrap();
+        for line in yaml.lines().filter(|line| !line.starts_with('#')) {
+            let (_, value) = line.split_once(": ").unwrap_or_default();
+            let is_number = value.is_empty() || value.parse::<f64>().is_ok();
+            assert!(is_number || value.starts_with('"'), "{name}: {line}");
+        }
+    }
+}
+
+#[test]
+fn items_with_the_same_id_are_refused() {
+    let mut description = describe(&MODIO_02, "0.1.0", |_| Module::Di4);
+    let registers = &mut description.registers;
+    let status = registers.iter().find(|register| register.name == "status");
+    let twice = status.unwrap().clone();
+    registers.push(twice);
+    let book = Book::new(description, vec![(0, 0); 32]);
+    for (format, _) in FORMATS {
+        let error = export(format, &book, &serial()).unwrap_err();
+        assert!(error.contains("modio_02_1_status"), "{error}");
+    }
+}
+
 #[test]
 fn pulses_of_inputs_are_counters() {
     let read = |format| parsed(format, &export_of(format, &modio_02(Module::Di4)));

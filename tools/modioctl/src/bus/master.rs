@@ -101,6 +101,11 @@ impl Master {
         &self.endpoint
     }
 
+    /// Returns the number of the latest request.
+    pub const fn transaction(&self) -> u16 {
+        self.transaction
+    }
+
     /// Returns whether the adapter has returned what it sends.
     pub const fn has_echo(&self) -> bool {
         matches!(self.echo, Some(true))

@@ -1,10 +1,13 @@
 //! `modioctl export`.
 
+use crate::adapter::{is_numbered, lasting_name};
+use crate::bus::Place;
 use crate::cli::Export;
 use crate::device::{Device, fetch};
 use crate::export::{Line, Source, text};
 use crate::failure::Failure;
 use crate::output;
+use crate::warnings::of_export;
 
 /// Writes a configuration of another system for the unit, or for several units of the line.
 pub async fn run(device: &mut Device, options: &Export) -> Result<(), Failure> {
@@ -22,14 +25,33 @@ pub async fn run(device: &mut Device, options: &Export) -> Result<(), Failure> {
             ))
         })?);
     }
+    for source in &units {
+        if let Some(warning) = of_export(&source.book, source.unit) {
+            eprintln!("modioctl: warning: {warning}");
+        }
+    }
+    let mut endpoint = device.master.endpoint().clone();
+    if let Place::Serial(port) = &mut endpoint.place
+        && let Some(lasting) = lasting_name(port)
+    {
+        *port = lasting;
+    }
     let text = text(
         options.format,
         Line {
             name: options.name.as_deref(),
-            endpoint: device.master.endpoint(),
+            endpoint: &endpoint,
             units: &units,
         },
     )?;
+    if let Place::Serial(port) = &endpoint.place
+        && is_numbered(port)
+        && text.contains(port)
+    {
+        eprintln!(
+            "modioctl: warning: {port} can be another adapter after a restart of the computer: see `modioctl ports` for a name that stays"
+        );
+    }
     output::save(&text, options.output.as_deref(), options.force)
 }
 

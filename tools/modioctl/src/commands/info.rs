@@ -60,7 +60,7 @@ const fn group(address: u16) -> &'static str {
 /// Shows identity, state and counters of the unit.
 pub async fn run(device: &mut Device, json: bool) -> Result<(), Failure> {
     let mut identity = match identity(device).await {
-        Err(Unidentified::Lost(lost)) => return Err(device.lost(&lost)),
+        Err(Unidentified::Lost(lost)) => return Err(device.lost_after(&identify(0), &lost)),
         objects => objects.unwrap_or_default(),
     };
     let book = fetch(device).await?.book;
@@ -188,14 +188,18 @@ impl fmt::Display for Unidentified {
     }
 }
 
+/// Returns the request for the device identification from this object on (V1.1b3, 6.21).
+const fn identify(object: u8) -> [u8; 4] {
+    [0x2B, 0x0E, 0x03, object]
+}
+
 /// Returns the objects of the device identification.
 pub async fn identity(device: &mut Device) -> Result<Vec<(String, String)>, Unidentified> {
     let mut found = Vec::new();
     let mut object = 0;
     // Extended stream from an object on. A unit with few objects needs only one answer.
     for _ in 0..16 {
-        let request = [0x2B, 0x0E, 0x03, object];
-        let answer = device.master.ask(device.unit, &request).await;
+        let answer = device.master.ask(device.unit, &identify(object)).await;
         let answer = answer.map_err(Unidentified::Lost)?;
         let objects = match answer[..] {
             [function, code] if function & 0x80 != 0 => Err(Unidentified::Exception(code)),

@@ -13,6 +13,7 @@ use crate::links::{self, Order, action_of, acts, is_alone, sentence};
 use crate::names::{Book, Item};
 use crate::output;
 use crate::value::point_name;
+use crate::warnings::of_links;
 
 /// Prints the links of the unit.
 pub async fn list(device: &mut Device, json: bool) -> Result<(), Failure> {
@@ -31,21 +32,38 @@ pub async fn list(device: &mut Device, json: bool) -> Result<(), Failure> {
     let rows = used.iter();
     let rows = rows.map(|(item, words)| [item.name.clone(), sentence(&book, item, words)]);
     output::table(&rows.collect::<Vec<_>>())?;
-    warn_of_alone(device, used.iter().map(|(_, words)| *words)).await
+    device.warn_of(&book, &values).await
 }
 
-/// Prints a warning when one of these links acts only while the master is gone, and the unit does not notice that.
-async fn warn_of_alone<'a>(
-    device: &mut Device,
-    mut links: impl Iterator<Item = &'a Vec<u16>>,
-) -> Result<(), Failure> {
-    let is_for_alone = |words: &Vec<u16>| acts(words) && words.get(1).is_some_and(|w| is_alone(*w));
-    if links.any(is_for_alone) && device.read_words(COMM_TIMEOUT, 1).await? == [0] {
-        eprintln!(
-            "modioctl: warning: COMM_TIMEOUT is 0, so a link with `if alone` never acts: set the time after which the master counts as gone, such as `modioctl config set COMM_TIMEOUT=5`"
-        );
+impl Device {
+    /// Prints warnings about links, given as their words.
+    async fn warn_of(&mut self, book: &Book, links: &[Vec<u16>]) -> Result<(), Failure> {
+        if links.iter().any(|words| acts(words)) {
+            let timeout = self.read_words(COMM_TIMEOUT, 1).await?;
+            let timeout = timeout.first().copied().unwrap_or_default();
+            for warning in of_links(book, links, timeout) {
+                eprintln!("modioctl: warning: {warning}");
+            }
+        }
+        Ok(())
     }
-    Ok(())
+
+    /// Prints warnings about all links after these settings were written, if one of them concerns links.
+    pub async fn warn_of_links(&mut self, written: &[(Item, Vec<u16>)]) -> Result<(), Failure> {
+        let concerns = |item: &Item| {
+            let of_source = item.name.ends_with(".range") || item.name.ends_with(".scale");
+            of_source || item.name.contains(".link") || item.address == COMM_TIMEOUT
+        };
+        if !written.iter().any(|(item, _)| concerns(item)) {
+            return Ok(());
+        }
+        let book = fetch_set(self).await?;
+        let outputs = book.points();
+        let items = outputs.flat_map(|output| links::of(&book, &output.name));
+        let items: Vec<_> = items.collect();
+        let values = self.read_items(&items).await?;
+        self.warn_of(&book, &values).await
+    }
 }
 
 fn as_json(book: &Book, item: &Item, words: &[u16]) -> Json {
@@ -92,7 +110,8 @@ pub async fn link(device: &mut Device, text: &str, done: &Note) -> Result<(), Fa
     if let Some(note) = note {
         eprintln!("modioctl: note: {note}");
     }
-    warn_of_alone(device, changes.iter().map(|(_, words)| words)).await
+    let words: Vec<_> = changes.into_iter().map(|(_, words)| words).collect();
+    device.warn_of(&book, &words).await
 }
 
 /// Returns the link to write: the link that already has this source, or else the first free link.

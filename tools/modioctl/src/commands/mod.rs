@@ -119,7 +119,7 @@ async fn dispatch(mut cli: Cli, note: &Note) -> Result<(), Failure> {
         Command::Config(options) => config::run(device, options, json, note).await,
         Command::Links => links::list(&mut device, json).await,
         Command::Link { words } => links::link(&mut device, &words.join(" "), note).await,
-        Command::Watch(options) => watch::run(device, &options).await,
+        Command::Watch(options) => watch::run(device, &options, cli.trace).await,
         Command::Events(options) => fast::events::run(device, &options, json).await,
         Command::Address(options) => fast::address::run(device.master, &options, note).await,
         Command::Raw(options) => raw::run(&mut device, &options).await,

@@ -3,10 +3,11 @@
 use serde_json::json;
 use serialport::{SerialPortInfo, SerialPortType, available_ports};
 
+use crate::adapter::lasting_name;
 use crate::failure::Failure;
 use crate::output;
 
-/// Lists the serial ports with the known data of their adapters.
+/// Lists the serial ports with the known data of their adapters, and the names that stay the same.
 pub fn run(json: bool) -> Result<(), Failure> {
     let ports = available_ports().map_err(|error| {
         Failure::Port(format!(
@@ -15,7 +16,12 @@ pub fn run(json: bool) -> Result<(), Failure> {
     })?;
     if json {
         let each = ports.iter().map(|port| {
-            json!({ "port": port.port_name, "adapter": adapter(port), "serial": serial(port) })
+            json!({
+                "port": port.port_name,
+                "adapter": adapter(port),
+                "serial": serial(port),
+                "lasting_name": lasting_name(&port.port_name),
+            })
         });
         return output::json(&each.collect::<Vec<_>>());
     }
@@ -24,7 +30,10 @@ pub fn run(json: bool) -> Result<(), Failure> {
     }
     let rows: Vec<_> = ports
         .iter()
-        .map(|port| [port.port_name.clone(), adapter(port), serial(port)])
+        .map(|port| {
+            let lasting = lasting_name(&port.port_name).unwrap_or_default();
+            [port.port_name.clone(), adapter(port), serial(port), lasting]
+        })
         .collect();
     output::table(&rows)
 }

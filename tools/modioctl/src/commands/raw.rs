@@ -26,10 +26,14 @@ pub async fn run(device: &mut Device, options: &Raw) -> Result<(), Failure> {
         }
         Err(Lost::Garbled(bytes)) => {
             let shown = adu::bytes(framing, &bytes);
-            output::line(format_args!("<- {shown}  not an answer to this request"))?;
-            Err(device.lost(&Lost::Garbled(bytes)))
+            let other = device.other(&pdu, &bytes);
+            let other = other.map_or_else(String::new, |other| format!(": {other}"));
+            output::line(format_args!(
+                "<- {shown}  not an answer to this request{other}"
+            ))?;
+            Err(device.lost_after(&pdu, &Lost::Garbled(bytes)))
         }
-        Err(lost) => Err(device.lost(&lost)),
+        Err(lost) => Err(device.lost_after(&pdu, &lost)),
     }
 }
 

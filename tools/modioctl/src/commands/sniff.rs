@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use chrono::{DateTime, Local, SecondsFormat};
 use modbus_line::capture::{Packet, Recorder};
+use modbus_line::other::{TELNET, is_telnet};
 use modbus_line::port::is_pseudo_terminal;
 use serde_json::{Value as Json, json};
 use tokio::time::{Instant, timeout};
@@ -150,6 +151,8 @@ fn milliseconds(time: Duration) -> f64 {
 
 fn words(framing: Framing, piece: &Piece) -> String {
     match &piece.kind {
+        // Three bytes can be noise.
+        Kind::Garbled if piece.bytes.len() > 3 && is_telnet(&piece.bytes) => TELNET.to_owned(),
         Kind::Garbled => format!("garbled: {}", decode::count_of(&piece.bytes)),
         Kind::Frame {
             direction, request, ..
@@ -224,6 +227,17 @@ mod tests {
         pieces.extend(splitter.push(&answer, second + Duration::from_micros(4260)));
         pieces.extend(splitter.flush());
         pieces
+    }
+
+    #[test]
+    fn frame_of_a_gateway_with_telnet_is_named() {
+        let mut splitter = Splitter::new(Framing::Rtu, Duration::ZERO, Duration::ZERO);
+        let frame = Framing::Rtu.frame(0, 1, &[3, 2, 0, 0xFF]);
+        let (front, back) = frame.split_at(5);
+        let pieces = splitter.push(&[front, &[0xFF], back].concat(), Duration::ZERO);
+        let pieces = [pieces, splitter.flush()].concat();
+        let words = pieces.iter().map(|piece| words(Framing::Rtu, piece));
+        assert_eq!(words.collect::<Vec<_>>(), [TELNET]);
     }
 
     #[test]

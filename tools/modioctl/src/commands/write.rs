@@ -46,7 +46,7 @@ pub async fn run(
         if is_unsaved {
             eprintln!("modioctl: {UNSAVED}");
         }
-        return Ok(());
+        return device.warn_of_links(&checked).await;
     }
     for (item, words) in &checked {
         if let Some(sources) = held.get(&item.name) {
@@ -64,7 +64,7 @@ pub async fn run(
     if is_unsaved {
         output::line(UNSAVED)?;
     }
-    Ok(())
+    device.warn_of_links(&checked).await
 }
 
 impl Device {

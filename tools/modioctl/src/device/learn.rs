@@ -84,8 +84,14 @@ async fn description(device: &mut Device) -> Result<Option<(Description, String)
             "the unit's description cannot be used ({error}): a newer modioctl may be needed"
         ))
     })?;
-    if let Some(path) = &path {
-        keep(path, &file);
+    let kept = match &path {
+        Some(path) => keep(path, &file).map_err(|error| format!("{}: {error}", path.display())),
+        None => Err("the unit has no identity, or this user has no home directory".to_owned()),
+    };
+    if let Err(why) = kept {
+        eprintln!(
+            "modioctl: the description is not stored, so the next command reads it again ({why})"
+        );
     }
     Ok(Some((read, "the unit".to_owned())))
 }
@@ -133,7 +139,7 @@ async fn read<const N: usize>(
 
 /// Returns file 1 of the unit, as bytes with a valid CRC.
 async fn read_file(device: &mut Device) -> Result<Vec<u8>, Failure> {
-    eprintln!("modioctl: reading the unit's description; it is stored for the next time");
+    eprintln!("modioctl: reading the unit's description");
     let mut last = None;
     for _ in 0..TIMES {
         let mut file = device.read_records(FILE, 0, HEAD).await?;
@@ -198,15 +204,17 @@ fn kept(path: &Path) -> Option<Description> {
     Description::open(&std::fs::read(path).ok()?).ok()
 }
 
-/// Stores a description. If that fails, it is read again next time.
-fn keep(path: &Path, file: &[u8]) {
+/// Stores a description.
+fn keep(path: &Path, file: &[u8]) -> std::io::Result<()> {
     // Write another file and rename it, so that the file is never incomplete.
     let new = path.with_extension(format!("{}.new", std::process::id()));
     let written = path
         .parent()
         .map_or(Ok(()), std::fs::create_dir_all)
         .and_then(|()| std::fs::write(&new, file));
-    if written.and_then(|()| std::fs::rename(&new, path)).is_err() {
+    let kept = written.and_then(|()| std::fs::rename(&new, path));
+    if kept.is_err() {
         let _ = std::fs::remove_file(&new);
     }
+    kept
 }

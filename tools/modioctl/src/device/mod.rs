@@ -2,6 +2,7 @@
 
 mod learn;
 mod orders;
+mod other;
 mod several;
 
 use modbus_line::adu::{pdu, words_of, write_words};
@@ -9,6 +10,7 @@ use modbus_line::names;
 
 pub use learn::{fetch, fetch_set, known};
 pub use orders::with_modules;
+use other::shown;
 
 use crate::bus::endpoint::{Endpoint, Place};
 use crate::bus::{Lost, MOST, Master, Observer, adu, is_busy};
@@ -51,7 +53,7 @@ impl Device {
                 [function, code] if function & 0x80 != 0 => Err(self.exception(code, about)),
                 _ => Ok(response),
             },
-            Err(lost) => Err(self.lost(&lost)),
+            Err(lost) => Err(self.lost_after(pdu, &lost)),
         }
     }
 
@@ -178,19 +180,10 @@ impl Device {
             Lost::Garbled(bytes) if bytes.len() >= MOST => Failure::Garbled(format!(
                 "the line at {place} is never silent: wrong rate or format, a program that sends all the time, or a line without bias"
             )),
-            Lost::Garbled(bytes) => {
-                let shown = bytes.get(..bytes.len().min(12)).unwrap_or_default();
-                Failure::Garbled(format!(
-                    "something answers at {place}, but garbled ({} bytes: {}{}): wrong rate or format, two units with address {unit}, or no termination",
-                    bytes.len(),
-                    adu::bytes(endpoint.framing, shown),
-                    if shown.len() < bytes.len() {
-                        " ..."
-                    } else {
-                        ""
-                    },
-                ))
-            }
+            Lost::Garbled(bytes) => Failure::Garbled(format!(
+                "something answers at {place}, but garbled ({}): wrong rate or format, two units with address {unit}, or no termination",
+                shown(endpoint.framing, bytes)
+            )),
             Lost::Broken(error) => Failure::Port(format!(
                 "{place} is lost ({error}): check that the adapter is plugged in, or that the gateway runs"
             )),

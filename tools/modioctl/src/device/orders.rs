@@ -5,6 +5,7 @@ use std::time::Duration;
 use modio_description::Description;
 use register_map::codes::{self, Command};
 use register_map::configuration::{BAUD, COMMAND, KEY, MODE, OPENING_KEY, UNIT};
+use register_map::second;
 use register_map::state::{self, status};
 use tokio::time::{Instant, sleep};
 
@@ -56,7 +57,10 @@ impl Device {
     /// because a restart loses what is not saved, and because a gateway in front of it keeps its own; or with those that
     /// its registers announce. Both are tried in turn. The lock must be open.
     pub async fn restart(mut self) -> Result<Self, Failure> {
-        let line = self.read_words(BAUD, 3).await?;
+        let line = match self.is_on_second_line().await? {
+            true => Vec::new(),
+            false => self.read_words(BAUD, 3).await?,
+        };
         let unit = self.stored_unit().await?;
         let before = Before {
             uptime: self.uptime().await?,
@@ -173,6 +177,18 @@ impl Device {
         self.read_words(state::UNIQUE_ID, 6).await
     }
 
+    /// Returns whether the requests arrive over the unit's second line, such as a radio: BAUD, FORMAT and MODE are those of
+    /// the first line, which does not count them.
+    async fn is_on_second_line(&mut self) -> Result<bool, Failure> {
+        let before = match self.read_words(second::BUS_MESSAGES, 1).await {
+            Err(Failure::Refused(_)) => return Ok(false),
+            before => before?,
+        };
+        let first = self.read_words(state::BUS_MESSAGES, 1).await?;
+        Ok(self.read_words(state::BUS_MESSAGES, 1).await? == first
+            && self.read_words(second::BUS_MESSAGES, 1).await? != before)
+    }
+
     /// Returns the value of UNIT, or `None` for a unit with an address switch.
     async fn stored_unit(&mut self) -> Result<Option<u8>, Failure> {
         match self.read_words(UNIT, 1).await {
@@ -192,8 +208,8 @@ struct Before {
     unique_id: Vec<u16>,
 }
 
-/// Returns the endpoint for a unit that announces these values of BAUD, FORMAT and MODE, and of UNIT if it has no switch,
-/// if they make a difference. Values without a meaning change nothing.
+/// Returns the endpoint for a unit that announces these values of BAUD, FORMAT and MODE, none on the second line, and of
+/// UNIT if it has no switch, if they make a difference. Values without a meaning change nothing.
 fn announced(now: &Endpoint, line: &[u16], unit: Option<u8>) -> Option<Endpoint> {
     // In recovery mode the unit always uses the factory's line settings.
     if now.unit == 255 {

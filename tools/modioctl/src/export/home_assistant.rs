@@ -7,7 +7,7 @@
 use modio_description::Table;
 use serde::Serialize;
 
-use super::{Line, Scaling, Source, identifier, no_ascii_over_tcp, plain, power};
+use super::{Line, Scaling, Source, identifier, no_ascii_over_tcp, plain, power, yaml};
 use crate::bus::adu::Framing;
 use crate::bus::endpoint::host_and_port;
 use crate::bus::{Endpoint, Place};
@@ -145,7 +145,7 @@ struct Write {
 }
 
 /// Returns the YAML text. All units of the line are entities of one hub: Home Assistant ignores every further hub with
-/// the same port or host.
+/// the same serial port, or with the same host and port.
 pub fn text(line: Line<'_>) -> Result<String, Failure> {
     no_ascii_over_tcp("Home Assistant", line.endpoint)?;
     let title = line.title()?;
@@ -176,7 +176,7 @@ pub fn text(line: Line<'_>) -> Result<String, Failure> {
             vec![Template { number: numbers }]
         },
     };
-    let yaml = serde_yaml_ng::to_string(&file).map_err(Failure::usage)?;
+    let yaml = yaml::text(&file)?;
     Ok(format!(
         "# Home Assistant configuration for {title}, written by `modioctl export home-assistant`.\n{yaml}"
     ))

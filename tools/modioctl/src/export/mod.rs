@@ -8,6 +8,9 @@ mod home_assistant;
 mod json;
 mod node_red;
 mod telegraf;
+mod yaml;
+
+use std::collections::BTreeSet;
 
 use modio_description::{Table, Unit};
 
@@ -61,6 +64,7 @@ pub struct Source {
 
 /// Returns the text of a configuration.
 pub fn text(format: ExportFormat, line: Line<'_>) -> Result<String, Failure> {
+    line.check_names()?;
     match format {
         ExportFormat::Csv => csv::text(line),
         ExportFormat::Json => json::text(line),
@@ -80,6 +84,24 @@ impl Line<'_> {
         }
         let silence = self.endpoint.line().t35();
         Some(silence.as_millis() as u64 + 2)
+    }
+
+    /// Fails when two items have the same name in the form of ids: a system drops or mixes up one of them.
+    fn check_names(&self) -> Result<(), Failure> {
+        let mut names = BTreeSet::new();
+        for source in self.units {
+            let unit = self.unit_name(source)?;
+            for item in source.items() {
+                let name = identifier(&format!("{unit} {}", item.name));
+                if !names.insert(name.clone()) {
+                    return Err(Failure::Refused(format!(
+                        "the description of unit {} has two items that would both be {name}: no export; see `modioctl describe`",
+                        source.unit
+                    )));
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Returns the name of the line: the name that the user gives, or else that of the only unit.
@@ -106,6 +128,12 @@ impl Source {
     /// Returns whether a master can set a point.
     fn can_set(&self, point: &Item) -> bool {
         point.writable && !self.held.contains_key(&point.name)
+    }
+
+    /// Returns what is exported.
+    fn items(&self) -> impl Iterator<Item = &Item> {
+        let items = self.book.points().chain(self.counters());
+        items.chain(self.diagnostics())
     }
 
     fn counters(&self) -> impl Iterator<Item = &Item> {

@@ -134,8 +134,7 @@ fn modbus(
 }
 
 fn metric(source: &Source, is_wanted: impl Fn(&Item) -> bool) -> Result<Metric, Failure> {
-    let items = source.book.points().chain(source.counters());
-    let items = items.chain(source.diagnostics());
+    let items = source.items();
     Ok(Metric {
         slave_id: source.unit,
         byte_order: "ABCD",

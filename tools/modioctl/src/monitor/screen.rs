@@ -1,6 +1,7 @@
 //! The terminal: prepared for the display, and restored at every kind of end.
 
 use std::io::{self, stdout};
+use std::mem::ManuallyDrop;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
@@ -18,8 +19,8 @@ const LOOK: Duration = Duration::from_millis(50);
 
 /// The terminal while the display is shown. Dropping it restores the terminal.
 pub struct Screen {
-    /// Draws on the terminal.
-    pub terminal: DefaultTerminal,
+    /// Draws on the terminal. It is never dropped: that would print on a terminal that is closed, and panic.
+    pub terminal: ManuallyDrop<DefaultTerminal>,
     /// Whether a task or a thread has panicked. In that case the terminal has been restored and shows the reason.
     panicked: Arc<AtomicBool>,
     ended: Arc<AtomicBool>,
@@ -29,18 +30,19 @@ pub struct Screen {
 impl Screen {
     /// Prepares the terminal and reads its events.
     pub fn open() -> Result<(Self, UnboundedReceiver<io::Result<Event>>), Failure> {
+        // The hook that ratatui sets prints on a terminal that is closed, and so panics again: it is replaced below.
+        let hook = std::panic::take_hook();
         let terminal = ratatui::try_init().map_err(|error| {
-            ratatui::restore();
+            restore();
             Failure::usage(format!("the terminal cannot be used: {error}"))
         })?;
         let panicked = Arc::new(AtomicBool::new(false));
-        let hook = std::panic::take_hook();
         std::panic::set_hook(Box::new({
             let panicked = Arc::clone(&panicked);
             move |info| {
                 panicked.store(true, Ordering::Relaxed);
                 let _ = execute!(stdout(), DisableMouseCapture);
-                // This hook of ratatui restores the terminal and calls the previous hook.
+                restore();
                 hook(info);
             }
         }));
@@ -51,11 +53,11 @@ impl Screen {
             move || read(&events, &ended)
         });
         let reader = reader.map_err(|error| {
-            ratatui::restore();
+            restore();
             Failure::usage(format!("keys cannot be read: {error}"))
         })?;
         let mut screen = Self {
-            terminal,
+            terminal: ManuallyDrop::new(terminal),
             panicked,
             ended,
             reader,
@@ -83,6 +85,7 @@ impl Screen {
 impl Drop for Screen {
     fn drop(&mut self) {
         self.ended.store(true, Ordering::Relaxed);
+        let _ = self.terminal.show_cursor();
         // Restoring it a second time would move the cursor into the text of the panic.
         if self.has_panicked() {
             return;
@@ -94,8 +97,13 @@ impl Drop for Screen {
         while !self.reader.is_finished() && Instant::now() < until {
             std::thread::sleep(LOOK / 10);
         }
-        ratatui::restore();
+        restore();
     }
+}
+
+/// Restores the terminal, if it is still there.
+fn restore() {
+    let _ = ratatui::try_restore();
 }
 
 fn read(events: &UnboundedSender<io::Result<Event>>, ended: &AtomicBool) {

@@ -1,9 +1,11 @@
 //! Tests of `links` and `link`.
 
 use register_map::Module;
+use register_map::board::MODIO_08;
+use register_map::links::{LINKS, NO_SOURCE, WORDS};
 
 use crate::program::{At, has};
-use crate::served::{modio_02, response, serve_requests, server};
+use crate::served::{modio, modio_02, response, serve_requests, server};
 use crate::unit::Unit;
 
 #[test]
@@ -15,6 +17,40 @@ fn unit_without_links_is_reported() {
     for words in ["links", "link p5.1 toggles p5.2", "link none p5.1"] {
         has(&at.run(words).failed(2), &["the unit has no links"]);
     }
+}
+
+/// A modio-08 with 0-10 V inputs in raw codes in port 1, and outputs in port 2.
+#[test]
+fn settings_that_make_a_link_surprising_are_warned_of_by_each_command() {
+    let modio = modio(&MODIO_08, |port| match port {
+        1 => Module::Ai4,
+        2 => Module::Do4,
+        _ => Module::None,
+    });
+    let none = (LINKS..).step_by(WORDS.into()).take(64);
+    let mut unit = server(none.map(|link| (link, NO_SOURCE)).chain(modio));
+    let at = At::tcp(serve_requests(move |address, pdu| {
+        Some(response(&mut unit, address, pdu))
+    }));
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("unit.toml");
+    std::fs::write(&file, "p2.1.link1 = \"p1.1, 257, 900, 800\"\n").unwrap();
+    for words in [
+        "link p1.1 switches p2.1 on above 900 off below 800 if alone".to_owned(),
+        "links".to_owned(),
+        "write COMM_TIMEOUT=0".to_owned(),
+        "config set p2.1.link1=p1.1,257,900,800".to_owned(),
+        format!("config import {}", file.display()),
+    ] {
+        let ran = at.run(&words);
+        let warnings = ran.err.matches("modioctl: warning: ").count();
+        assert_eq!((ran.status, warnings), (0, 3), "{words}: {ran:?}");
+    }
+    let ran = at.run("export csv");
+    has(
+        &ran.err,
+        &["modioctl: warning: unit 1, p1.1, p1.2, p1.3, p1.4: SCALE is 0"],
+    );
 }
 
 #[test]

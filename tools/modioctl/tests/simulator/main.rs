@@ -6,6 +6,7 @@
 
 mod behind_gateway;
 mod bus;
+mod closed;
 mod commands;
 mod ending;
 mod errors;
@@ -16,6 +17,7 @@ mod importing;
 mod links;
 mod listening;
 mod monitor;
+mod naming;
 mod newer;
 mod ordinary;
 mod program;
@@ -23,7 +25,9 @@ mod restart;
 mod scanning;
 mod screen;
 mod served;
+mod strange;
 mod terminal;
 mod trouble;
 mod unit;
 mod updating;
+mod watching;

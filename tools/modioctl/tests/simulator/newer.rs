@@ -6,7 +6,7 @@ use modio_description::{Description, Register, Scope, Unit, Value, Values, check
 use register_map::Module;
 use register_map::board::MODIO_02;
 
-use crate::program::{At, has};
+use crate::program::{At, Ran, has};
 use crate::served::{response, serve_requests, server};
 
 /// Returns the description: that of a modio-02 with new parts.
@@ -106,6 +106,20 @@ fn refresh_reads_the_description_again_with_every_command() {
         assert_eq!(ran.err.contains("reading"), is_read, "{words}: {ran:?}");
         ran.fine();
     }
+}
+
+#[test]
+fn description_that_cannot_be_stored_is_reported() {
+    let at = At::tcp(unit(&description(), 1));
+    let mut command = at.command("read PRESSURE_LIMIT");
+    // A folder cannot be created in a file.
+    let output = command.env("XDG_CACHE_HOME", "/dev/null").output();
+    let ran = Ran::of(&output.unwrap());
+    has(&ran.err, &["is not stored", "/dev/null"]);
+    assert!(!ran.err.contains("stored for"), "{ran:?}");
+    ran.fine();
+    let ran = at.run("read PRESSURE_LIMIT");
+    assert!(!ran.err.contains("is not stored"), "{ran:?}");
 }
 
 #[test]

@@ -8,12 +8,12 @@ use std::thread;
 use modbus_reference::{Device, Server};
 use modio_description::{checksum, describe};
 use modioctl::bus::adu::{Framing, request_length};
-use register_map::Module;
 use register_map::board::MODIO_02;
 use register_map::configuration::MODULE;
 use register_map::state::{
     BOARD, DESCRIPTION_CRC, FIRMWARE_VERSION, MODULE_IN_FORCE, PRODUCT, PRODUCT_CODE,
 };
+use register_map::{Board, Module, points};
 
 /// Serves each connection in a new thread. Returns the address.
 pub fn serve(connection: impl Fn(TcpStream) + Clone + Send + 'static) -> SocketAddr {
@@ -81,15 +81,29 @@ pub fn server(words: impl IntoIterator<Item = (u16, u16)>) -> Server {
 }
 
 /// Returns registers of a modio-02 with this module, whose description the program knows.
-pub fn modio_02(module: Module) -> [(u16, u16); 7] {
-    let description = describe(&MODIO_02, "0.1.0", |_| module);
-    [
+pub fn modio_02(module: Module) -> Vec<(u16, u16)> {
+    modio(
+        &MODIO_02,
+        |port| if port == 5 { module } else { Module::None },
+    )
+}
+
+/// Returns registers of this board with these modules, whose description the program knows.
+pub fn modio(board: &Board, module: impl Fn(u16) -> Module) -> Vec<(u16, u16)> {
+    let description = describe(board, "0.1.0", &module);
+    let head = [
         (PRODUCT_CODE, (PRODUCT >> 16) as u16),
         (PRODUCT_CODE + 1, PRODUCT as u16),
         (FIRMWARE_VERSION, 0x0001),
-        (BOARD, 1),
+        (BOARD, board.code),
         (DESCRIPTION_CRC, checksum(&description.encode())),
-        (MODULE + 4, module.code()),
-        (MODULE_IN_FORCE + 4, module.code()),
-    ]
+    ];
+    let modules = (1..=points::PORTS).flat_map(|port| {
+        let code = module(port).code();
+        [
+            (MODULE + port - 1, code),
+            (MODULE_IN_FORCE + port - 1, code),
+        ]
+    });
+    head.into_iter().chain(modules).collect()
 }

@@ -2,7 +2,7 @@
 
 mod file;
 
-use std::io::{IsTerminal, stdin};
+use std::io::{IsTerminal, Write as _, stderr, stdin};
 use std::path::Path;
 
 use register_map::codes::Command;
@@ -46,7 +46,8 @@ pub async fn run(
             let mut progress = Progress::of_settings(note, changes.len());
             device.unlock().await?;
             write(&mut device, &changes, &mut progress).await?;
-            output::line("written, but not saved: save with `modioctl config save`")
+            output::line("written, but not saved: save with `modioctl config save`")?;
+            device.warn_of_links(&changes).await
         }
         Config::Save => {
             device.unlock().await?;
@@ -74,6 +75,7 @@ pub async fn run(
                 agree(&modules.join(", ")).await?;
             }
             import(&mut device, &wanted, &file, rows.len(), note).await?;
+            device.warn_of_links(&wanted).await?;
             finish(device, restart).await
         }
         Config::Reset { restart } => {
@@ -203,7 +205,8 @@ fn table(mut rows: Vec<[String; 3]>, other: &str) -> Result<(), Failure> {
 async fn agree(modules: &str) -> Result<(), Failure> {
     let mut answer = String::new();
     if stdin().is_terminal() {
-        eprint!("modioctl: {modules} changes: write all of this? [y/N] ");
+        let question = format_args!("modioctl: {modules} changes: write all of this? [y/N] ");
+        let _ = write!(stderr(), "{question}");
         let (tell, told) = tokio::sync::oneshot::channel();
         // Ctrl-C ends the program while this thread waits for a line.
         std::thread::spawn(move || {

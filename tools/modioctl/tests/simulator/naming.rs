@@ -1,0 +1,45 @@
+//! Tests of the name of a serial port in a written file.
+
+use std::io::{Read, Write};
+use std::os::unix::fs::symlink;
+
+use modioctl::bus::adu::Framing;
+use portable_pty::{PtySize, native_pty_system};
+use register_map::Module;
+
+use crate::program::At;
+use crate::served::{modio_02, response, server};
+
+#[test]
+fn export_with_a_port_whose_number_can_change_is_warned_of() {
+    let pty = native_pty_system().openpty(PtySize::default()).unwrap();
+    let mut requests = pty.master.try_clone_reader().unwrap();
+    let mut responses = pty.master.take_writer().unwrap();
+    std::thread::spawn(move || {
+        let mut server = server(modio_02(Module::Di4));
+        let mut bytes = [0; 256];
+        while let Ok(count @ 1..) = requests.read(&mut bytes) {
+            if let Some((unit, pdu)) = Framing::Rtu.open(&bytes[..count]) {
+                let _ = responses.write_all(&response(&mut server, unit, &pdu));
+            }
+        }
+    });
+    let folder = tempfile::tempdir().unwrap();
+    let port = pty.master.tty_name().unwrap();
+    for (name, system, warnings) in [
+        ("ttyUSB0", "home-assistant", 1),
+        ("ttyACM3", "json", 1),
+        ("ttyUSB1", "csv", 0),
+        ("line", "telegraf", 0),
+    ] {
+        let path = folder.path().join(name);
+        symlink(&port, &path).unwrap();
+        let ran = At::port(path.display()).run(&format!("export {system}"));
+        let told = format!(
+            "modioctl: warning: {} can be another adapter",
+            path.display()
+        );
+        assert_eq!(ran.err.matches(&told).count(), warnings, "{ran:?}");
+        ran.fine();
+    }
+}
