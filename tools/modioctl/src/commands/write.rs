@@ -76,7 +76,9 @@ impl Device {
     ) -> Result<(), Failure> {
         let is_locked = |item: &Item| item.setting || item.name == "COMMAND";
         let settings = checked.iter().filter(|(item, _)| item.setting);
-        let has_settings = settings.clone().count() > 0;
+        // An order among the values may have saved them.
+        let has_orders = checked.iter().any(|(item, _)| item.name == "COMMAND");
+        let has_settings = settings.clone().count() > 0 && !has_orders;
         let mut progress = Progress::of_values(note, checked.len(), has_settings);
         if checked.iter().any(|(item, _)| is_locked(item)) {
             self.unlock().await?;

@@ -45,7 +45,8 @@ impl Device {
                 return Ok(());
             }
             if Instant::now() > until {
-                return Err(Failure::Refused(
+                // It may save later: a unit whose supply is low waits.
+                return Err(Failure::Busy(
                     "the unit reports that the settings are not saved: try `modioctl config save`, and see `modioctl info`".to_owned(),
                 ));
             }

@@ -11,7 +11,7 @@ use crate::value::long;
 /// Records of file 2 that a poll during the transfer reads.
 const SHORT: u16 = status::SLOT + 1;
 /// Records of file 2 with both images.
-pub(super) const LONG: u16 = status::OTHER.end;
+pub(super) const LONG: u16 = status::CRCS.end;
 /// Registers from the version to the commit.
 const IDENTITY: u16 = COMMIT + 2 - FIRMWARE_VERSION;
 

@@ -60,6 +60,8 @@ pub struct Unit {
     pub stage: Stage,
     /// The image that it is to run, as file 2 reports it.
     pub(super) image: [u16; 8],
+    /// The CRC-32 of this image; 0 if it is not known.
+    crc: u32,
     /// The order that starts the image: [`Command::Finish`] or [`Command::GoBack`].
     pub(super) starts: Command,
     /// For each block whether it is missing.
@@ -76,8 +78,11 @@ pub struct Unit {
     was_silent: bool,
     /// It has not answered since then.
     is_sought: bool,
+    /// It has the order to start the image, so what its other slot holds is about this update.
+    is_ordered: bool,
     silences: u8,
     orders: u8,
+    confirms: u8,
     polls: u8,
     rounds: u8,
 }
@@ -91,6 +96,7 @@ impl Unit {
             target,
             stage,
             image,
+            crc: 0,
             starts: Command::Finish,
             missing: vec![true; image[5].into()],
             is_known: false,
@@ -99,11 +105,19 @@ impl Unit {
             was_interrupted: false,
             was_silent: false,
             is_sought: false,
+            is_ordered: matches!(stage, Stage::Restarting | Stage::OnTrial),
             silences: 0,
             orders: 0,
+            confirms: 0,
             polls: 0,
             rounds: 0,
         }
+    }
+
+    /// Returns the unit with the CRC-32 of the image, by which it is told from another build of the same commit.
+    #[must_use]
+    pub fn of_crc(self, crc: u32) -> Self {
+        Self { crc, ..self }
     }
 
     /// Returns a unit that is to start the image in its other slot again.
@@ -153,6 +167,7 @@ impl Unit {
     pub(super) const fn ordered(&mut self, stage: Stage) {
         self.stage = stage;
         self.polls = 0;
+        self.is_ordered |= matches!(stage, Stage::Restarting);
     }
 
     /// Counts an order; fails when there were too many.
@@ -189,7 +204,7 @@ impl Unit {
     pub(super) fn look_again(&mut self) {
         if self.stage == Stage::Failed(Fault::Silent) && !self.was_silent {
             (self.was_silent, self.is_sought) = (true, true);
-            self.ordered(Stage::Restarting);
+            (self.stage, self.polls) = (Stage::Restarting, 0);
         }
     }
 
@@ -209,7 +224,7 @@ impl Unit {
         }
     }
 
-    /// Counts a block that the unit cannot take at this time. Returns whether to send it again.
+    /// Counts a request that the unit cannot take at this time. Returns whether to send it again.
     pub(super) const fn is_busy(&mut self) -> bool {
         self.polls += 1;
         self.polls %= BUSY;
@@ -220,9 +235,11 @@ impl Unit {
     pub(super) const fn unconfirmed(&mut self) {
         self.polls += 1;
         if self.polls >= CONFIRM_POLLS {
-            self.count_order(Fault::NotConfirmed);
-            if self.is_active() {
+            self.confirms += 1;
+            if self.confirms < ORDERS {
                 self.stage = Stage::OnTrial;
+            } else {
+                self.fail(Fault::NotConfirmed);
             }
         }
     }
@@ -310,13 +327,20 @@ impl Unit {
 
     /// Takes the state after the order to start the image.
     pub(super) fn restarts(&mut self, status: &Status) {
-        let [runs, _] = &status.images;
+        let ([runs, _], [crc, _]) = (&status.images, status.crcs);
         if status.slot == self.target {
-            if *runs == self.image {
+            let is_another_build = ![self.crc, crc].contains(&0) && self.crc != crc;
+            if *runs == self.image && !is_another_build {
                 self.ordered(Stage::OnTrial);
             } else {
                 self.fail(Fault::OtherImage);
             }
+            return;
+        }
+        if !self.is_ordered {
+            // It was away while it took blocks. What its other slot holds may be from before.
+            self.ordered(Stage::Receiving);
+            self.is_known = false;
             return;
         }
         self.poll(RESTART_POLLS, Fault::NotStarted);

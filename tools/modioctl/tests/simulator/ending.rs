@@ -3,6 +3,7 @@
 use register_map::Module;
 use register_map::codes::Command;
 use register_map::configuration::{BAUD, COMMAND, LORA_ADDRESS, MODULE};
+use register_map::state::{STATUS, status};
 
 use crate::program::{At, Ran, has};
 use crate::served::{modio_02, response, serve_requests, server};
@@ -34,7 +35,7 @@ fn run(words: &str, request: &[u8], exception: Option<u8>) -> Ran {
         })
     });
     let words = words.replace("FILE", file.to_str().unwrap());
-    At::tcp(unit).run(&format!("--timeout 100ms --retries 0 {words}"))
+    At::tcp(unit).run(&format!("--timeout 500ms --retries 0 {words}"))
 }
 
 /// Returns the beginning of a request that writes a register, and all of one that writes this value.
@@ -156,4 +157,16 @@ fn a_unit_that_refuses_one_of_several_requests_has_not_carried_it_out() {
         let text = run(words, request, REFUSES).failed(1);
         has(&text, &["exception 03", told]);
     }
+}
+
+#[test]
+fn a_save_that_the_unit_puts_off_may_still_be_made() {
+    let registers = modio_02(Module::Do4).into_iter();
+    let mut server = server(registers.chain([(STATUS, status::UNSAVED)]));
+    let unit = serve_requests(move |unit, pdu| Some(response(&mut server, unit, pdu)));
+    let text = At::tcp(unit).run("config save").failed(1);
+    has(
+        &text,
+        &["the settings are not saved", "; the settings may be saved"],
+    );
 }

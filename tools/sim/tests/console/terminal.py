@@ -98,7 +98,7 @@ class Terminal:
         self.bash.stdin.flush()
         limit = time.monotonic() + PATIENCE
         while True:
-            printed = output.read_bytes()[begin:].decode()
+            printed = output.read_bytes()[begin:].decode(errors="replace")
             if ended := re.search(r" ended (\d+)\n\Z", printed):
                 return int(ended[1]), self.there(printed[:ended.start()])
             if self.bash.poll() is not None or time.monotonic() > limit:
@@ -113,7 +113,7 @@ class Terminal:
         status, _ = self.run_here(re.sub(r"&\s*(#.*)?$", f"> {output} 2>&1 &", self.here(command)))
         limit = time.monotonic() + PATIENCE
         while True:
-            printed = output.read_text()
+            printed = output.read_text(errors="replace")
             if "--http" not in command and (told := re.search(r"^http: http://(.*)/$", printed, re.MULTILINE)):
                 self.http = told[1]
             printed = self.there(printed)

@@ -6,7 +6,7 @@ use chrono::Local;
 use tokio::time::{Instant, sleep_until};
 
 use super::progress::Progress;
-use crate::bus::{Lost, is_busy};
+use crate::bus::Lost;
 use crate::cli::Watch;
 use crate::commands::watch::print;
 use crate::device::Device;
@@ -155,7 +155,6 @@ impl Drive<'_> {
             master.be_patient(timeout, retries);
         }
         match answer {
-            Ok(answer) if is_busy(pdu, &answer) => Ok(None),
             Ok(answer) => Ok(Some(answer)),
             Err(Lost::Silent | Lost::Absent(_) | Lost::Garbled(_)) => Ok(None),
             Err(lost @ Lost::Broken(_)) => Err(self.device.lost(&lost)),

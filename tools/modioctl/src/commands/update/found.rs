@@ -66,18 +66,12 @@ async fn ask(device: &mut Device) -> Result<Found, Failure> {
         ));
     }
     let asked = Instant::now();
-    let mut file = device
+    let file = device
         .read_records(status::FILE, 0, status::REVOKED + 1)
         .await;
-    if matches!(file, Err(Failure::Refused(_))) {
-        // Older firmware has neither the CRC-32s nor the keys.
-        file = device
-            .read_records(status::FILE, 0, status::OTHER.end)
-            .await;
-    }
     let file = file.map_err(|failure| match failure {
         Failure::Refused(text) => Failure::Refused(format!(
-            "{text}; the unit has a loader, so a gateway probably does not pass function 14: an update needs functions 14 and 15"
+            "{text}; the unit has a loader, so a gateway in front of it does not pass function 14: an update needs functions 14 and 15"
         )),
         failure => failure,
     })?;
@@ -163,8 +157,11 @@ impl Found {
             ));
         }
         // The words of the unit, because the commit of the same image may be another one.
-        let unit = |stage| Ok(Unit::new(self.address, *slot, *runs, stage));
-        let is_running = self.status.runs(file.image(*slot));
+        let own = file.image(*slot);
+        let unit = |stage| Ok(Unit::new(self.address, *slot, *runs, stage).of_crc(own.crc));
+        // An image on trial that reports no CRC-32 can only be confirmed, so its words are enough.
+        let has_no_crc = self.status.crcs == [0; 2];
+        let is_running = self.status.runs(own) || (self.trial && has_no_crc && *runs == own.words);
         let is_by_its_key = file.key() == key_of(runs);
         if is_running && is_by_its_key && self.trial {
             // An update was interrupted after the restart.
@@ -196,7 +193,7 @@ impl Found {
             }
             _ => Stage::Waiting,
         };
-        Ok(Unit::new(self.address, target, image.words, stage))
+        Ok(Unit::new(self.address, target, image.words, stage).of_crc(image.crc))
     }
 
     /// Returns whether the update of this unit restarts it while settings are in force that are not saved.

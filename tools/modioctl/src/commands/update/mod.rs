@@ -207,6 +207,7 @@ fn refuse(failed: &[Failure]) -> Result<(), Failure> {
     Err(match first {
         Failure::NoAnswer(_) => Failure::NoAnswer(text),
         Failure::Garbled(_) => Failure::Garbled(text),
+        Failure::Busy(_) => Failure::Busy(text),
         _ => Failure::Usage(text),
     })
 }

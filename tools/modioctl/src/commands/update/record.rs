@@ -30,7 +30,7 @@ fn described(words: &[u16]) -> String {
     };
     let (counter, uptime) = (at(fault::PROGRAM_COUNTER), at(fault::UPTIME));
     format!(
-        "its last fault: {kind}, program counter {counter:#010x}, {uptime} s after its start (`modioctl info`)"
+        "its last fault, perhaps of before: {kind}, program counter {counter:#010x}, {uptime} s after its start (`modioctl info`)"
     )
 }
 
@@ -47,7 +47,7 @@ mod tests {
         words[11] = 7;
         assert_eq!(
             described(&words),
-            "its last fault: hard fault, program counter 0x08012345, 7 s after its start (`modioctl info`)"
+            "its last fault, perhaps of before: hard fault, program counter 0x08012345, 7 s after its start (`modioctl info`)"
         );
     }
 }

@@ -158,10 +158,9 @@ pub fn report(
             _ if unit.target == found.status.slot && !found.trial => "runs it already",
             _ => "confirmed",
         };
-        let (before, after) = (
-            found.running().to_string(),
-            Version::of(unit.image()).to_string(),
-        );
+        // Files do not say whether they are a release, so neither does this.
+        let [before, after] =
+            [found.runs(), unit.image()].map(|words| Version::of(words).to_string());
         rows.push((unit.address, before, after, unit.target, result));
     }
     let mut all = Times::default();

@@ -3,7 +3,7 @@
 use register_map::codes::Command;
 use register_map::update::State;
 
-use super::{Action, Campaign, PROGRAMMING, SLOWER, SLOWEST};
+use super::{Action, Campaign, POLL, PROGRAMMING, SLOWER, SLOWEST};
 use crate::update::messages;
 use crate::update::{Fault, Stage, Status};
 
@@ -71,12 +71,32 @@ impl Campaign {
                 self.queue.push_front(Action::Wait(PROGRAMMING));
                 self.sent -= 1;
             }
+            // A gateway that has other clients. The order to keep the image can be given twice.
+            (
+                Action::Unlock(..)
+                | Action::Order(_, Command::Confirm)
+                | Action::Status(_)
+                | Action::Early(..)
+                | Action::Short(_)
+                | Action::Bits(_)
+                | Action::Identity(_)
+                | Action::Confirmed(_),
+                5 | 6,
+            ) if unit.is_busy() => {
+                self.queue.push_front(action);
+                self.queue.push_front(Action::Wait(POLL));
+            }
             // What the unit reports shows why.
             (Action::Block(..), _) => self.drop_queued(index),
             // It has been carried out, or must be given again.
             (Action::Order(_, Command::Finish), 6) => {
                 unit.count_order(Fault::Refused("the order to start the image", code));
                 unit.is_known = false;
+            }
+            // It has been carried out, and this answers a repeated request; or what the unit reports shows why not.
+            (Action::Order(_, Command::GoBack), 6) => {
+                unit.ordered(Stage::Restarting);
+                unit.count_order(Fault::Refused("the order to start the image", code));
             }
             (Action::Order(_, command), _) => {
                 let what = match command {

@@ -3,10 +3,11 @@
 use std::time::Duration;
 
 use modbus_line::{Format, LineFormat, t35};
+use register_map::codes::Command;
 use register_map::update::BLOCK_BYTES;
 
 use super::model::Model;
-use crate::update::{Campaign, Patience, Step};
+use crate::update::{Campaign, Patience, Step, messages};
 
 /// Time for which the master waits for an answer as usual, three times.
 const USUAL: Duration = Duration::from_secs(1);
@@ -23,6 +24,10 @@ pub struct Bus {
     pub drops_broadcasts: bool,
     /// The adapter joins blocks with a shorter pause between them, so that most are lost.
     pub joins: Duration,
+    /// The answer to the first order of this kind is lost.
+    pub loses: Option<Command>,
+    /// Number of writes of a register that a gateway answers with exception 06, before it passes them on.
+    pub busy: u8,
     pub random: fastrand::Rng,
     pub now: Duration,
     /// Time from the first block until the last one has been sent.
@@ -39,6 +44,8 @@ impl Bus {
             errors: [0.0; 2],
             drops_broadcasts: false,
             joins: Duration::ZERO,
+            loses: None,
+            busy: 0,
             random: fastrand::Rng::with_seed(1),
             now: Duration::from_secs(1),
             blocks: None,
@@ -68,6 +75,10 @@ impl Bus {
         if self.is_lost(pdu.len(), all) || (unit == 0 && self.drops_broadcasts) {
             return None;
         }
+        if pdu[0] == 6 && self.busy > 0 {
+            self.busy -= 1;
+            return Some(vec![0x86, 6]);
+        }
         let mut answer = None;
         for index in 0..self.units.len() {
             if !self.is_lost(pdu.len(), own) {
@@ -77,6 +88,13 @@ impl Bus {
             }
         }
         let answer = answer?;
+        if self
+            .loses
+            .is_some_and(|command| pdu == messages::order(command.code()))
+        {
+            self.loses = None;
+            return None;
+        }
         self.frame(answer.len());
         let lost = self.is_lost(answer.len(), all) || self.is_lost(answer.len(), own);
         (!lost).then_some(answer)

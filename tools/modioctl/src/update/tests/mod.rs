@@ -9,7 +9,7 @@ use register_map::update::{Reason, Slot, State};
 
 use super::file::File;
 use super::file::tests::of_blocks;
-use super::{Campaign, Fault, Stage, Step, Unit};
+use super::{Campaign, Fault, Stage, Status, Step, Unit};
 use bus::Bus;
 use model::Flaw;
 
@@ -272,6 +272,108 @@ fn the_way_back_needs_no_blocks_and_is_confirmed() {
     assert_eq!([0, 1].map(|unit| bus.units[unit].trial), [false, true]);
 }
 
+/// Behind a gateway: the answer to the order is lost, and the gateway repeats nothing, so the program does. The unit has
+/// restarted by then, and its lock is closed.
+#[test]
+fn a_repeated_order_to_go_back_is_refused_and_has_been_carried_out() {
+    let mut bus = Bus::new(9600, 1);
+    let older = [0x0002, 0, 0, 7, 8, 200, 0, 0];
+    let unit = &mut bus.units[0];
+    (unit.state, unit.images[1]) = (State::Confirmed, older);
+    unit.restart = std::time::Duration::from_millis(200);
+    bus.loses = Some(Command::GoBack);
+    let mut campaign = Campaign::new(&[], vec![Unit::back(1, Slot::B, older)], true);
+    bus.run(&mut campaign);
+    assert_eq!(stages(&campaign), [Stage::Done]);
+    assert_eq!(bus.units[0].orders, [Command::GoBack, Command::Confirm]);
+}
+
+#[test]
+fn an_order_to_go_back_that_is_always_refused_is_reported_as_refused() {
+    let mut bus = Bus::new(9600, 1);
+    let older = [0x0002, 0, 0, 7, 8, 200, 0x0101, 0xFFFF];
+    let unit = &mut bus.units[0];
+    (unit.state, unit.images[1]) = (State::Confirmed, older);
+    (unit.keys, unit.revoked) = ([0x0101_FFFF, 0x0202_EEEE], true);
+    let mut campaign = Campaign::new(&[], vec![Unit::back(1, Slot::B, older)], false);
+    bus.run(&mut campaign);
+    let refused = Fault::Refused("the order to start the image", 6);
+    assert_eq!(stages(&campaign), [Stage::Failed(refused)]);
+}
+
+#[test]
+fn a_gateway_that_is_busy_when_a_unit_is_on_trial_is_asked_again() {
+    let file = of_blocks(20);
+    let image = file.image(Slot::B);
+    for (busy, ends) in [
+        (3, Stage::Done),
+        (50, Stage::Failed(Fault::Refused("to open the lock", 6))),
+    ] {
+        let mut bus = Bus::new(9600, 1);
+        let unit = &mut bus.units[0];
+        (unit.runs, unit.images[0], unit.trial) = (Slot::B, image.words, true);
+        bus.busy = busy;
+        let unit = Unit::new(1, Slot::B, image.words, Stage::OnTrial);
+        let mut campaign = Campaign::new(&image.blocks, vec![unit], true);
+        bus.run(&mut campaign);
+        assert_eq!(stages(&campaign), [ends]);
+    }
+}
+
+/// Returns the records of a unit that runs this image from slot B.
+fn runs(image: [u16; 8], crc: u32) -> Status {
+    let mut words = vec![0; 28];
+    words[4] = 2;
+    words[8..16].copy_from_slice(&image);
+    (words[24], words[25]) = ((crc >> 16) as u16, crc as u16);
+    Status::of(&words).unwrap()
+}
+
+#[test]
+fn another_build_of_the_same_commit_is_another_image() {
+    let words = of_blocks(20).image(Slot::B).words;
+    let stage = |own, reported| {
+        let mut unit = Unit::new(1, Slot::B, words, Stage::Restarting).of_crc(own);
+        unit.restarts(&runs(words, reported));
+        unit.stage
+    };
+    for (own, reported) in [(5, 5), (0, 5), (5, 0)] {
+        assert_eq!(stage(own, reported), Stage::OnTrial, "{own} {reported}");
+    }
+    assert_eq!(stage(5, 6), Stage::Failed(Fault::OtherImage));
+}
+
+#[test]
+fn a_unit_that_was_away_before_the_order_to_start_is_not_blamed_for_an_old_image() {
+    let words = of_blocks(20).image(Slot::B).words;
+    let mut status = runs(words, 0);
+    status.slot = Slot::A;
+    status.state = Some(State::Rejected(Reason::NotConfirmed));
+    let mut unit = Unit::new(1, Slot::B, words, Stage::Waiting);
+    for _ in 0..4 {
+        unit.silent();
+    }
+    unit.look_again();
+    unit.answered();
+    unit.restarts(&status);
+    assert_eq!(unit.stage, Stage::Receiving);
+    unit.reports(&status);
+    assert_eq!(unit.stage, Stage::Waiting, "it is prepared");
+}
+
+#[test]
+fn orders_before_the_start_do_not_count_against_the_confirmation() {
+    let words = of_blocks(20).image(Slot::B).words;
+    let mut unit = Unit::new(1, Slot::B, words, Stage::Confirming);
+    for _ in 0..4 {
+        unit.count_order(Fault::Restarts);
+    }
+    for _ in 0..4 {
+        unit.unconfirmed();
+    }
+    assert_eq!(unit.stage, Stage::OnTrial, "the order is given again");
+}
+
 /// Returns an answer to this request with these words; for some values of `kind` none, an exception or anything.
 fn false_answer(
     random: &mut fastrand::Rng,
@@ -313,7 +415,7 @@ fn false_answers_end_the_plan() {
         let units = units.collect();
         let mut campaign = Campaign::new(&image.blocks, units, random.bool());
         let word = || random.choice([0, 1, 2, 3, 5, 6, 20, 0xFFFF]).unwrap();
-        let words: Vec<_> = std::iter::repeat_with(word).take(24).collect();
+        let words: Vec<_> = std::iter::repeat_with(word).take(28).collect();
         let mut steps = 0;
         while let Some(step) = campaign.next_step() {
             let answer = match step {

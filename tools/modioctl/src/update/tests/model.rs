@@ -135,6 +135,8 @@ impl Model {
             }
             8..16 => self.images[0][usize::from(record) - 8],
             16..24 => self.images[1][usize::from(record) - 16],
+            // Zeros, as of all records that it does not know.
+            24..=32 if self.older => 0,
             24..32 => {
                 let longs = [self.crcs, self.keys];
                 let long = longs.as_flattened()[usize::from(record - 24) / 2];
@@ -182,9 +184,6 @@ impl Model {
         let mut answer = vec![0x14, 0];
         for group in pdu[2..].chunks(7) {
             let [first, count] = [3, 5].map(|at| u16::from_be_bytes([group[at], group[at + 1]]));
-            if self.older && first < 24 && first + count > 24 {
-                return Err(2);
-            }
             answer.extend([1 + 2 * count as u8, 6]);
             let words = (first..first + count).map(|record| self.record(record, now));
             answer.extend(words.flat_map(u16::to_be_bytes));

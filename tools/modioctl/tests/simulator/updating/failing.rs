@@ -41,7 +41,7 @@ fn firmware_that_crashes_is_started_by_one_order_and_ends_with_the_fault_record(
     let text = line.run("update FILE").failed(1);
     let why = "modioctl: unit 1 rejected the image (it was started twice and not confirmed), and runs the previous one: ";
     has(&text, &[why]);
-    let record = "; its last fault: panic, program counter 0x08012344, 3 s after its start";
+    let record = "; its last fault, perhaps of before: panic, program counter 0x08012344, 3 s after its start";
     has(&text, &[record]);
     assert!(!text.contains("same command"), "{text}");
     let orders = [Command::Prepare, Command::Finish];
