@@ -24,6 +24,9 @@ mod bench;
 #[allow(dead_code, reason = "the tests of the modio-08 use the rest")]
 #[path = "../image/fast_master.rs"]
 mod fast_master;
+#[allow(dead_code, reason = "tests of other boards use the rest")]
+#[path = "../image/registers.rs"]
+mod registers;
 mod rs232;
 #[path = "../image/timing.rs"]
 mod timing;
@@ -57,14 +60,8 @@ fn relay(bench: &Bench, name: &str) -> bool {
 }
 
 /// Returns a reading of registers.
-fn words(bench: &mut Bench, first: u16, count: u8) -> Vec<u16> {
-    let [high, low] = first.to_be_bytes();
-    let reply = bench.ask(1, &[3, high, low, 0, count]).expect("a reply");
-    assert_eq!(reply[..2], [3, 2 * count], "{reply:02X?}");
-    let words = reply[2..].chunks(2);
-    words
-        .map(|word| u16::from_be_bytes([word[0], word[1]]))
-        .collect()
+fn words(bench: &mut Bench, first: u16, count: u16) -> Vec<u16> {
+    bench.words(3, first, count).expect("the registers exist")
 }
 
 #[test]
