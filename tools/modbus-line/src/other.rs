@@ -15,6 +15,9 @@ const OPTIONS: std::ops::RangeInclusive<u8> = 0xFB..=0xFE;
 pub const TELNET: &str =
     "the gateway speaks telnet, as for RFC 2217, which doubles each byte FF: set it to raw TCP";
 
+/// What to do with a gateway that speaks Modbus TCP.
+pub const MODBUS_TCP: &str = "it is Modbus TCP: use --modbus-tcp in place of --tcp";
+
 impl Waiting<'_> {
     /// Returns what these bytes are, which were received in place of an answer, and what to do; `None` if that is not
     /// known. The transaction of this request is the latest of the program, whose first one is 1.
@@ -22,19 +25,14 @@ impl Waiting<'_> {
     pub fn other(&self, bytes: &[u8]) -> Option<String> {
         match self.framing {
             Framing::Mbap => self.other_on_tcp(bytes),
-            _ if is_modbus_tcp(bytes) => {
-                Some("it is Modbus TCP: use --modbus-tcp in place of --tcp".to_owned())
-            }
             Framing::Rtu if is_telnet(bytes) => Some(TELNET.to_owned()),
-            framing => {
-                let (unit, pdu, is_request) = frame(framing, self.pdu, bytes)?;
-                let is_own = unit == self.unit && pdu == self.pdu;
-                match is_request {
-                    true if is_own => None,
-                    true => Some("another master uses the line: only one may".to_owned()),
-                    false => Some(self.other_answer(unit, &pdu)),
-                }
-            }
+            // A frame with a valid checksum first: the header of Modbus TCP has none.
+            framing => match frame(framing, self.pdu, bytes) {
+                Some((unit, pdu, true)) if (unit, &pdu[..]) == (self.unit, self.pdu) => None,
+                Some((_, _, true)) => Some("another master uses the line: only one may".to_owned()),
+                Some((unit, pdu, false)) => Some(self.other_answer(unit, &pdu)),
+                None => is_modbus_tcp(bytes).then(|| MODBUS_TCP.to_owned()),
+            },
         }
     }
 
@@ -195,6 +193,9 @@ mod tests {
         }
         let request = Framing::Rtu.frame(0, 7, READ);
         assert!(other(Framing::Rtu, &request).starts_with("another master"));
+        // The beginning of this request is also that of a frame of Modbus TCP.
+        let usual = Framing::Rtu.frame(0, 1, &[3, 0, 0, 0, 2]);
+        assert!(other(Framing::Rtu, &usual).starts_with("another master"));
         let own = Framing::Rtu.frame(0, 1, READ);
         assert_eq!(other(Framing::Rtu, &own), "");
     }

@@ -5,20 +5,27 @@
 //! requests. The master therefore sends function 08/00 with a new word before such a read, and waits for that word: no
 //! older answer follows it.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
+use std::io;
 use std::time::Duration;
 
 use tokio::time::Instant;
 
 use super::Waiting;
 use super::adu::Framing;
-use super::master::{Lost, Master};
+use super::master::{Lost, MOST, Master};
 
-/// Time after which an answer is no longer expected.
+/// Time after a time-out from which an answer is no longer expected.
 const LATEST: Duration = Duration::from_secs(20);
 
 /// Largest number of requests that are remembered.
-const MOST: usize = 256;
+const REMEMBERED: usize = 256;
+
+/// Number of time-outs for which a unit without function 08 must be silent. Its answer may take almost two.
+const QUIET: u32 = 2;
+
+/// Longest time to wait for a late gateway, in time-outs.
+const MOST_PATIENCE: u32 = 4;
 
 /// A request without an answer.
 #[derive(Debug)]
@@ -27,6 +34,8 @@ struct Owed {
     unit: u8,
     pdu: Vec<u8>,
     sent: Instant,
+    /// Time of the time-out.
+    given_up: Instant,
 }
 
 /// The requests whose answer may still be received.
@@ -37,13 +46,15 @@ pub struct Late {
     answered: Option<Instant>,
     /// Longest time for one answer.
     longest: Duration,
+    /// Units that answer, and whether they answer function 08, too.
+    has_08: BTreeMap<u8, bool>,
 }
 
 impl Late {
     /// Adds a request that was sent at this time.
     pub fn add(&mut self, request: &Waiting, sent: Instant) {
         self.forget_old();
-        if self.owed.len() == MOST {
+        if self.owed.len() == REMEMBERED {
             self.owed.pop_front();
         }
         self.owed.push_back(Owed {
@@ -51,6 +62,7 @@ impl Late {
             unit: request.unit,
             pdu: request.pdu.to_vec(),
             sent,
+            given_up: Instant::now(),
         });
     }
 
@@ -60,9 +72,13 @@ impl Late {
         !self.owed.is_empty()
     }
 
-    /// Returns whether a late answer of this unit can be mistaken for the answer to this request on a serial line.
+    /// Returns whether a late answer of this unit can be mistaken for the answer to this request on a serial line. The
+    /// answer to a write shows its address.
     pub fn can_be_confused(&mut self, unit: u8, pdu: &[u8]) -> bool {
         self.forget_old();
+        if matches!(pdu, [0x05 | 0x06 | 0x0F | 0x10 | 0x16, ..]) {
+            return false;
+        }
         let of_same = |owed: &Owed| owed.unit == unit && owed.pdu.first() == pdu.first();
         let mut owed = self.owed.iter();
         owed.any(|owed| of_same(owed) && owed.pdu != pdu)
@@ -72,6 +88,17 @@ impl Late {
     pub fn passed(&mut self, unit: u8) {
         self.owed
             .retain(|owed| owed.unit != unit || owed.pdu.first() == Some(&8));
+        self.has_08.insert(unit, true);
+    }
+
+    /// Forgets what this unit owes.
+    fn forget(&mut self, unit: u8) {
+        self.owed.retain(|owed| owed.unit != unit);
+    }
+
+    /// Notes that this unit answers, and was silent to function 08.
+    pub fn has_no_08(&mut self, unit: u8) {
+        self.has_08.insert(unit, false);
     }
 
     /// Removes a late answer from the beginning of the received bytes. `now` is the pending request, whose answer stays.
@@ -98,7 +125,15 @@ impl Late {
                 unit: owed.unit,
                 pdu: &owed.pdu,
             };
-            waiting.find(first).map(|(_, range)| (n, range))
+            let (answer, range) = waiting.find(first)?;
+            // An exception does not show the word that was sent. It also proves the order when it is the answer to an
+            // earlier 08, if that was sent after all that the order is for.
+            let is_for_08 = matches!(now, Some((unit, [8, ..])) if unit == owed.unit);
+            let mut later = self.owed.iter().skip(n);
+            let proves = framing != Framing::Mbap
+                && (is_for_08 && answer.first() == Some(&0x88))
+                && !later.any(|later| later.unit == owed.unit && later.pdu.first() != Some(&8));
+            (!proves).then_some((n, range))
         })?;
         let owed = self.owed.remove(n)?;
         Some((bytes.drain(..range.end).collect(), owed.sent))
@@ -119,34 +154,74 @@ impl Late {
     }
 
     fn forget_old(&mut self) {
-        self.owed.retain(|owed| owed.sent.elapsed() < LATEST);
+        self.owed.retain(|owed| owed.given_up.elapsed() < LATEST);
+    }
+
+    /// Returns the time to wait for an answer of a gateway. One that was late is given more than the time-out: otherwise
+    /// the requests that wait in it would become more and more.
+    fn patience(&self, timeout: Duration) -> Duration {
+        (self.longest * 5 / 4).clamp(timeout, timeout * MOST_PATIENCE)
     }
 }
 
 impl Master {
-    /// Waits until the unit has answered 08/00 with a new word, and therefore all requests before it.
-    pub(super) async fn wait_for_order(&mut self, unit: u8) -> Result<(), Lost> {
+    /// Waits until no late answer of the unit can be mistaken for the answer to this request: until the unit has answered
+    /// 08/00 with a new word, and therefore all requests before it, or until it has been silent. Returns whether the unit
+    /// was silent to 08/00, which may be because it does not have it.
+    pub(super) async fn wait_for_order(&mut self, unit: u8, pdu: &[u8]) -> Result<bool, Lost> {
+        let has_08 = self.late.has_08.get(&unit).copied();
+        if has_08 == Some(false) {
+            self.wait_for_late(QUIET).await.map_err(Lost::Broken)?;
+            self.late.forget(unit);
+            return Ok(false);
+        }
+        let before = self.late.answered;
         if self.echo.is_none() {
             self.look_for_echo(unit).await?;
         }
-        let mut result = Err(Lost::Silent);
-        // A unit that answers nothing does not answer this either, and its response could not be distinguished from an
-        // echo.
-        if self.echo.is_none() {
-            return result;
-        }
-        for _ in 0..=self.endpoint().retries {
+        // A response to 08/00 could not be distinguished from an echo. But then the unit has just been silent.
+        let times = match self.echo {
+            None => 0,
+            Some(_) => 1 + self.endpoint().retries,
+        };
+        for n in 1..=times {
             let [high, low] = self.transaction.to_be_bytes();
-            result = match self.ask_once(unit, &[8, 0, 0, high, low]).await {
+            match self.ask_once(unit, &[8, 0, 0, high, low]).await {
                 Ok(_) | Err(Lost::Absent(_)) => {
                     self.late.passed(unit);
-                    return Ok(());
+                    return Ok(false);
                 }
+                Err(Lost::Silent) => {}
                 Err(lost @ Lost::Broken(_)) => return Err(lost),
-                Err(lost) => Err(lost),
-            };
+                Err(lost) if n == times => return Err(lost),
+                Err(_) => {}
+            }
         }
-        result
+        if has_08.is_none() && self.late.answered == before {
+            // Nothing was received for at least one time-out.
+            self.late.forget(unit);
+            return Ok(true);
+        }
+        match self.late.can_be_confused(unit, pdu) {
+            true => Err(Lost::Silent),
+            false => Ok(false),
+        }
+    }
+
+    /// Waits for the answers that are late, until nothing was received for this number of time-outs.
+    pub(super) async fn wait_for_late(&mut self, times: u32) -> io::Result<()> {
+        let mut got = Vec::new();
+        let wait = |master: &Self| Instant::now() + times * master.patience();
+        let mut until = wait(self);
+        while self.late.is_expected()
+            && got.len() < MOST
+            && self.read_until(until, &mut got).await? > 0
+        {
+            if self.take_late(&mut got, None) {
+                until = wait(self);
+            }
+        }
+        Ok(())
     }
 
     /// Removes late answers from the beginning of the received bytes. `now` is the pending request. Returns whether there
@@ -166,13 +241,43 @@ impl Master {
         self.late.longest()
     }
 
-    /// Returns the time to wait for an answer. A gateway that was late is given more than the time-out: otherwise the
-    /// requests that wait in it would become more and more.
+    /// Returns the time to wait for an answer.
     pub(super) fn patience(&self) -> Duration {
         let timeout = self.endpoint().timeout;
         match self.endpoint().framing {
-            Framing::Mbap => timeout.max(self.lateness() * 5 / 4),
+            Framing::Mbap => self.late.patience(timeout),
             Framing::Rtu | Framing::Ascii => timeout,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SECOND: Duration = Duration::from_secs(1);
+
+    /// A switch that restarts delays one answer.
+    #[test]
+    fn patience_with_a_gateway_is_some_time_outs_at_most() {
+        let mut late = Late::default();
+        assert_eq!(late.patience(SECOND), SECOND);
+        late.received(Instant::now() - 15 * SECOND);
+        assert_eq!(late.patience(SECOND), 4 * SECOND);
+        assert!(late.longest() >= 15 * SECOND);
+    }
+
+    #[test]
+    fn answer_after_a_time_out_of_any_length_is_expected() {
+        let mut late = Late::default();
+        let request = Waiting {
+            framing: Framing::Rtu,
+            transaction: 1,
+            unit: 1,
+            pdu: &[3, 0, 0, 0, 1],
+        };
+        late.add(&request, Instant::now() - 25 * SECOND);
+        assert!(late.can_be_confused(1, &[3, 0, 1, 0, 1]));
+        assert!(!late.can_be_confused(2, &[3, 0, 1, 0, 1]));
     }
 }

@@ -30,6 +30,10 @@ const SENDING: Duration = Duration::from_secs(2);
 /// Pause before a read is repeated because the unit or a gateway is busy.
 const BUSY: Duration = Duration::from_millis(200);
 
+/// Number of times that a read is repeated because the unit or a gateway is busy. It does not depend on `--retries`: that
+/// is for lost requests.
+const BUSY_TIMES: u8 = 2;
+
 /// Reads one register. The response never equals the request, so this shows whether an adapter returns what it sends.
 pub const PROBE: [u8; 5] = {
     let [high, low] = PRODUCT_CODE.to_be_bytes();
@@ -76,6 +80,8 @@ pub struct Master {
     pub(super) transaction: u16,
     /// Time from which the next frame may be sent.
     free: Instant,
+    /// Number of the latest request whose answer was garbled.
+    garbled: u16,
     /// Whether the adapter returns what it sends; `None` while that is not known.
     pub(super) echo: Option<bool>,
     /// Requests whose answer may still be received.
@@ -90,6 +96,7 @@ impl Master {
             endpoint,
             observer,
             transaction: 0,
+            garbled: 0,
             free: Instant::now(),
             echo: None,
             late: Late::default(),
@@ -101,9 +108,9 @@ impl Master {
         &self.endpoint
     }
 
-    /// Returns the number of the latest request.
-    pub const fn transaction(&self) -> u16 {
-        self.transaction
+    /// Returns the number of the latest request whose answer was garbled.
+    pub const fn garbled_transaction(&self) -> u16 {
+        self.garbled
     }
 
     /// Returns whether the adapter has returned what it sends.
@@ -130,31 +137,45 @@ impl Master {
         self.stream.discard_unsent();
     }
 
-    /// Sends a request to a unit, and repeats it as often as the endpoint says: without an answer of the unit, and a read
-    /// also when it is busy. Returns the PDU of the response, which may be an exception. The error is that of the last attempt, unless an earlier one was garbled.
+    /// Sends a request to a unit. Repeats it without an answer of the unit as often as the endpoint says, and a read also
+    /// when the unit is busy. Returns the PDU of the response, which may be an exception. The error is that of the last
+    /// attempt, unless an earlier one was garbled.
     pub async fn ask(&mut self, unit: u8, pdu: &[u8]) -> Result<Vec<u8>, Lost> {
         if self.echo.is_none() && !differs(pdu) {
             self.look_for_echo(unit).await?;
         }
+        let mut was_silent = false;
         if self.endpoint.framing != Framing::Mbap && self.late.can_be_confused(unit, pdu) {
-            self.wait_for_order(unit).await?;
+            was_silent = self.wait_for_order(unit, pdu).await?;
         }
-        let mut result = Err(Lost::Silent);
-        for _ in 0..=self.endpoint.retries {
-            // The attempt before was answered: the unit is busy.
-            if result.is_ok() {
-                sleep(BUSY).await;
-            }
-            let next = self.ask_once(unit, pdu).await;
-            match &next {
-                Ok(answer) if is_busy(pdu, answer) => {}
-                Ok(_) | Err(Lost::Broken(_)) => return next,
-                Err(Lost::Silent | Lost::Absent(_)) if is_garbled(&result) => continue,
-                Err(_) => {}
-            }
-            result = next;
+        let result = self.repeat(unit, pdu).await;
+        if was_silent && result.is_ok() {
+            self.late.has_no_08(unit);
         }
         result
+    }
+
+    async fn repeat(&mut self, unit: u8, pdu: &[u8]) -> Result<Vec<u8>, Lost> {
+        let mut busy = 0;
+        let mut lost = 0;
+        let mut result = Err(Lost::Silent);
+        loop {
+            let next = self.ask_once(unit, pdu).await;
+            match &next {
+                Ok(answer) if is_busy(pdu, answer) && busy < BUSY_TIMES => {
+                    busy += 1;
+                    sleep(BUSY).await;
+                    continue;
+                }
+                Ok(_) | Err(Lost::Broken(_)) => return next,
+                Err(Lost::Silent | Lost::Absent(_)) if is_garbled(&result) => {}
+                Err(_) => result = next,
+            }
+            if lost == self.endpoint.retries {
+                return result;
+            }
+            lost += 1;
+        }
     }
 
     /// Finds out whether the adapter returns what it sends. Without that a response that equals its request proves
@@ -225,12 +246,10 @@ impl Master {
             if count == 0 || self.free > most || discarded > STALE {
                 return Ok(());
             }
-            self.see(Direction::Response, &stale);
-            while self
-                .late
-                .take(self.endpoint.framing, &mut stale, None)
-                .is_some()
-            {}
+            self.take_late(&mut stale, None);
+            if !stale.is_empty() {
+                self.see(Direction::Response, &stale);
+            }
             let gap = Instant::now() + self.endpoint.frame_gap();
             self.free = self.free.max(gap);
         }
@@ -320,6 +339,7 @@ impl Master {
         if junk.is_empty() {
             return Err(Lost::Silent);
         }
+        self.garbled = self.transaction;
         self.received(&junk);
         Err(Lost::Garbled(junk))
     }

@@ -21,8 +21,7 @@ use crate::output;
 use left::{Left, list};
 
 /// Why a unit may be silent although its line is right.
-const DELAYED: &str =
-    "a unit with a long RESPONSE_DELAY or over the air needs a longer `--timeout`";
+const DELAYED: &str = "a unit with a long RESPONSE_DELAY or over the air needs a longer";
 
 /// Shortest time that is worth an announcement.
 const LONG_SCAN: Duration = Duration::from_secs(10);
@@ -63,6 +62,7 @@ pub async fn run(
     json: bool,
 ) -> Result<bool, Failure> {
     let serial = endpoint.place.is_serial();
+    let framing = endpoint.framing;
     if !serial && (options.rates.is_some() || options.formats.is_some()) {
         return Err(Failure::usage(
             "--rates and --formats are for a serial port: over TCP the gateway has the line's settings",
@@ -102,11 +102,16 @@ pub async fn run(
             list(scanned.busy.iter().copied())
         )));
     }
+    let wait = match framing {
+        // The gateway waits for the units.
+        Framing::Mbap => "time-out in the gateway",
+        Framing::Rtu | Framing::Ascii => "`--timeout`",
+    };
     let garbled = !scanned.garbled.is_empty() || !scanned.never_silent.is_empty();
     match (scanned.units.is_empty(), !garbled) {
         (false, _) => {
             if scanned.silent > 0 {
-                eprintln!("modioctl: silent addresses: {}; {DELAYED}", scanned.silent);
+                eprintln!("modioctl: silent addresses: {}; {DELAYED} {wait}", scanned.silent);
             }
             Ok(true)
         }
@@ -114,7 +119,7 @@ pub async fn run(
             "no unit could be read: wrong rate or format, two units with one address, or no termination".to_owned(),
         )),
         (true, true) => Err(Failure::NoAnswer(format!(
-            "no unit found{}: check power, wiring (A and B swapped?) and rate (`--rates all`); a unit's address is its DIP switch; {DELAYED}",
+            "no unit found{}: check power, wiring (A and B swapped?) and rate (`--rates all`); a unit's address is its DIP switch; {DELAYED} {wait}",
             match scanned.echo {
                 true => ", and the adapter returns what it sends, which is not an answer",
                 false => "",
@@ -207,8 +212,10 @@ async fn search(
         sweep(&mut master, units, several, bar, found, left).await?;
         if master.endpoint().framing == Framing::Mbap {
             scanned.late = master.lateness();
-        } else if !found.units.is_empty() && !found.never_silent {
-            scanned.silent += units.len() - found.units.union(&found.garbled).count();
+        }
+        if !found.units.is_empty() && !found.never_silent {
+            let answered = &found.units | &found.garbled;
+            scanned.silent += units.len() - answered.union(&found.busy).count();
         }
         scanned.busy.extend(&scanned.found.busy);
         scanned.echo |= master.has_echo();

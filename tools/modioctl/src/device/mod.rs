@@ -129,7 +129,7 @@ impl Device {
     }
 
     /// Returns the failure for a read that the unit, or a gateway, had no time for.
-    fn busy(&self, response: &[u8], about: &str) -> Failure {
+    pub fn busy(&self, response: &[u8], about: &str) -> Failure {
         let unit = self.unit;
         let code = response.last().copied().unwrap_or_default();
         let name = names::exception(code).unwrap_or_default();

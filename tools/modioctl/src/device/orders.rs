@@ -112,7 +112,9 @@ impl Device {
                 match self.has_restarted(before, ordered).await {
                     Ok(true) => return Ok(index),
                     Ok(false) => sleep(PAUSE).await,
-                    Err(failure @ (Failure::NoAnswer(_) | Failure::Garbled(_))) => last = failure,
+                    Err(
+                        failure @ (Failure::NoAnswer(_) | Failure::Garbled(_) | Failure::Busy(_)),
+                    ) => last = failure,
                     Err(failure) => return Err(failure),
                 }
             }

@@ -1,6 +1,6 @@
 //! Words for what was received in place of an answer.
 
-use modbus_line::other::TELNET;
+use modbus_line::other::{MODBUS_TCP, TELNET};
 
 use super::{Device, place};
 use crate::bus::adu::{self, Framing};
@@ -39,13 +39,13 @@ impl Device {
     pub fn other(&self, pdu: &[u8], bytes: &[u8]) -> Option<String> {
         let waiting = Waiting {
             framing: self.master.endpoint().framing,
-            transaction: self.master.transaction(),
+            transaction: self.master.garbled_transaction(),
             unit: self.unit,
             pdu,
         };
-        // Telnet is spoken on networks only.
+        // These are spoken on networks only.
         let other = waiting.other(bytes);
-        other.filter(|what| !self.is_serial() || what != TELNET)
+        other.filter(|what| !self.is_serial() || ![TELNET, MODBUS_TCP].contains(&what.as_str()))
     }
 }
 

@@ -98,6 +98,21 @@ fn a_read_is_repeated_while_the_unit_or_the_gateway_is_busy() {
     }
 }
 
+#[test]
+fn busy_is_asked_again_without_retries() {
+    let mut server = modio();
+    let mut is_busy = false;
+    let line = serve_requests(move |unit, pdu| {
+        is_busy = !is_busy;
+        Some(match is_busy {
+            true => Framing::Rtu.frame(0, unit, &[pdu[0] | 0x80, 6]),
+            false => response(&mut server, unit, pdu),
+        })
+    });
+    let text = At::tcp(line).run("--retries 0 read p5.1").fine();
+    assert_eq!(text, "p5.1  off\n");
+}
+
 /// Each absent unit costs the gateway more than the time-out, so the answers to later requests are late as well.
 #[test]
 fn a_scan_waits_for_the_late_answers_of_a_gateway() {
@@ -114,6 +129,52 @@ fn a_scan_waits_for_the_late_answers_of_a_gateway() {
         assert_eq!(ran.status, 3, "{ran:?}");
         has(&ran.err, &["the gateway answers late: --timeout 1s"]);
     }
+}
+
+/// After a bit error the gateway reports a unit that is there as absent.
+#[test]
+fn a_scan_over_modbus_tcp_asks_again_and_counts_the_silent_addresses() {
+    let mut server = modio();
+    let mut asked = [0; 7];
+    let line = serve_requests(move |unit, pdu| {
+        asked[usize::from(unit)] += 1;
+        Some(match (unit, asked[usize::from(unit)]) {
+            (5, 1) => Framing::Rtu.frame(0, unit, &[pdu[0] | 0x80, 0x0B]),
+            (2 | 5, _) => response(&mut server, unit, pdu),
+            _ => Vec::new(),
+        })
+    });
+    let wait = 200 * MS;
+    let gateway = Gateway {
+        wait,
+        ..Gateway::default()
+    };
+    let ran = At::modbus_tcp(gateway.before(line)).run("scan --units 1-6");
+    has(&ran.err, &["silent addresses: 4; ", "in the gateway"]);
+    let text = ran.fine();
+    assert_eq!(text.lines().count(), 2, "{text}");
+    assert!(text.contains("\n5  "), "{text}");
+}
+
+#[test]
+fn an_address_that_is_busy_and_then_silent_is_named_by_a_scan() {
+    let mut server = modio();
+    let mut asked = 0;
+    let line = serve_requests(move |unit, pdu| {
+        asked += i32::from(unit == 2);
+        Some(match unit {
+            1 => response(&mut server, unit, pdu),
+            2 if asked == 1 => Framing::Rtu.frame(0, unit, &[pdu[0] | 0x80, 6]),
+            _ => Vec::new(),
+        })
+    });
+    let wait = 200 * MS;
+    let gateway = Gateway {
+        wait,
+        ..Gateway::default()
+    };
+    let ran = At::modbus_tcp(gateway.before(line)).run("scan --units 1-3");
+    has(&ran.failed(1), &["had no time for addresses 2:"]);
 }
 
 #[test]
@@ -177,6 +238,17 @@ fn a_gateway_with_its_own_transaction_ids_is_status_4_and_creates_no_units() {
     );
 }
 
+#[test]
+fn a_gateway_that_answers_as_unit_255_is_status_4() {
+    let gateway = Gateway {
+        unit_255: true,
+        ..Gateway::default()
+    };
+    let at = At::modbus_tcp(gateway.before(units(&[1])));
+    let text = at.run("--timeout 50ms --retries 0 read 0").failed(4);
+    has(&text, &["unit 255 answers, not unit 1"]);
+}
+
 /// Reads two registers in turn from a unit that needs longer than the time-out for some answers. The value of each
 /// register is its address.
 #[track_caller]
@@ -187,7 +259,7 @@ fn read_in_turn(place: Place, framing: Framing, retries: u8) {
         .unwrap();
     runtime.block_on(async {
         let endpoint = Endpoint {
-            timeout: 40 * MS,
+            timeout: 100 * MS,
             retries,
             baud: 921_600,
             ..Endpoint::new(place, framing)
@@ -209,25 +281,115 @@ fn read_in_turn(place: Place, framing: Framing, retries: u8) {
     });
 }
 
-#[test]
-fn a_late_answer_is_never_mistaken_for_the_answer_to_another_request() {
-    for framing in [Framing::Rtu, Framing::Mbap] {
-        // `monitor` sends each request once.
-        for retries in [0, 2] {
-            let mut server = server((0..0x30).map(|n| (n, n)));
-            let mut random = fastrand::Rng::with_seed(1);
-            let line = serve_requests(move |unit, pdu| {
-                // Often twice in succession.
-                if random.bool() {
-                    thread::sleep(MS * random.u32(50..70));
-                }
-                Some(response(&mut server, unit, pdu))
-            });
-            let place = match framing {
-                Framing::Mbap => Place::ModbusTcp(Gateway::default().before(line).to_string()),
-                _ => Place::Tcp(line.to_string()),
-            };
-            read_in_turn(place, framing, retries);
+/// How a unit answers function 08.
+#[derive(Clone, Copy, Debug)]
+enum Echo {
+    Answer,
+    /// Every second answer is lost.
+    Lost,
+    Exception,
+    Silence,
+}
+
+impl Echo {
+    /// Returns the frame for a request of a function, which may be 08.
+    fn frame(self, server: &mut Server, unit: u8, pdu: &[u8]) -> Vec<u8> {
+        server.device.words[0x3F] += u16::from(pdu[0] == 8);
+        match (self, pdu[0]) {
+            (Self::Lost, 8) if server.device.words[0x3F] % 2 == 1 => Vec::new(),
+            (Self::Silence, 8) => Vec::new(),
+            (Self::Exception, 8) => Framing::Rtu.frame(0, unit, &[0x88, 1]),
+            _ => response(server, unit, pdu),
         }
     }
+}
+
+#[test]
+fn a_late_answer_is_never_mistaken_for_the_answer_to_another_request() {
+    let echoes = [Echo::Answer, Echo::Lost, Echo::Exception, Echo::Silence];
+    let rtu = echoes.map(|echo| (Framing::Rtu, echo));
+    thread::scope(|all| {
+        for (framing, echo) in rtu.into_iter().chain([(Framing::Mbap, Echo::Answer)]) {
+            // `monitor` sends each request once.
+            for retries in [0, 2] {
+                all.spawn(move || read_late_in_turn(framing, echo, retries));
+            }
+        }
+    });
+}
+
+fn read_late_in_turn(framing: Framing, echo: Echo, retries: u8) {
+    let mut server = server((0..0x30).map(|n| (n, n)));
+    let mut random = fastrand::Rng::with_seed(1);
+    let line = serve_requests(move |unit, pdu| {
+        // Often twice in succession.
+        if random.bool() {
+            thread::sleep(MS * random.u32(110..130));
+        }
+        Some(echo.frame(&mut server, unit, pdu))
+    });
+    let place = match framing {
+        Framing::Mbap => Place::ModbusTcp(Gateway::default().before(line).to_string()),
+        _ => Place::Tcp(line.to_string()),
+    };
+    read_in_turn(place, framing, retries);
+}
+
+/// A unit whose every second answer about register 0 has a bit error. The counter is the number of requests of function 08.
+fn damaging(
+    echo: impl Fn(&mut Server, u8, &[u8]) -> Vec<u8> + Send + 'static,
+) -> (At, Arc<Mutex<usize>>) {
+    let count = Arc::new(Mutex::new(0));
+    let requests = Arc::clone(&count);
+    let mut server = server([]);
+    let mut damage = false;
+    let line = serve_requests(move |unit, pdu| {
+        *requests.lock().unwrap() += usize::from(pdu[0] == 8);
+        let mut frame = echo(&mut server, unit, pdu);
+        if pdu[0] != 8 && pdu[1..3] == [0, 0] {
+            damage = !damage;
+            frame[3] ^= u8::from(damage);
+        }
+        Some(frame)
+    });
+    (At::tcp(line), count)
+}
+
+#[test]
+fn a_unit_that_is_silent_to_function_08_is_asked_after_a_damaged_answer() {
+    let (at, requests) = damaging(|server, unit, pdu| Echo::Silence.frame(server, unit, pdu));
+    let text = at
+        .run("--timeout 100ms watch 0 100 --csv --every 100ms --count 3")
+        .fine();
+    let values = text
+        .lines()
+        .skip(1)
+        .map(|row| row.split_once(',').unwrap().1);
+    assert_eq!(values.collect::<Vec<_>>(), ["0,0"; 3]);
+    assert_eq!(
+        *requests.lock().unwrap(),
+        3,
+        "one request and two retries, once"
+    );
+}
+
+#[test]
+fn writes_need_no_function_08_after_a_damaged_answer() {
+    let (at, requests) = damaging(|server, unit, pdu| Echo::Silence.frame(server, unit, pdu));
+    at.run("--timeout 100ms write 0=1 1=1").fine();
+    assert_eq!(*requests.lock().unwrap(), 0);
+}
+
+#[test]
+fn an_exception_to_function_08_shows_the_order_when_one_was_lost() {
+    let (at, _) = damaging({
+        let lost = std::sync::atomic::AtomicBool::new(false);
+        move |server, unit, pdu| match pdu[0] == 8
+            && !lost.swap(true, std::sync::atomic::Ordering::Relaxed)
+        {
+            true => Vec::new(),
+            false => Echo::Exception.frame(server, unit, pdu),
+        }
+    });
+    at.run("--timeout 100ms read 0 100").fine();
 }

@@ -84,6 +84,24 @@ fn restart_over_the_second_line_announces_no_settings_of_the_first() {
     assert_eq!(text, "restarted\n");
 }
 
+#[test]
+fn a_unit_that_is_busy_while_it_starts_is_waited_for() {
+    let mut unit = server([(UPTIME + 1, 1000)]);
+    let mut busy = 0;
+    let at = At::tcp(serve_requests(move |address, pdu| {
+        if busy > 0 {
+            busy -= 1;
+            return Some(Framing::Rtu.frame(0, address, &[pdu[0] | 0x80, 6]));
+        }
+        if pdu[0] == 6 && pdu[1..3] == COMMAND.to_be_bytes() {
+            unit.device.words[usize::from(UPTIME) + 1] = 0;
+            busy = 5;
+        }
+        Some(response(&mut unit, address, pdu))
+    }));
+    assert_eq!(at.run("--timeout 200ms reboot").fine(), "restarted\n");
+}
+
 /// A unit over TCP with address 1, which misses one request while it restarts. Its UNIT announces 17. If that is not
 /// saved, another unit, which has just started, has address 17.
 fn moving_unit(is_saved: bool) -> SocketAddr {
