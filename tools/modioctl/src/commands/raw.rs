@@ -1,6 +1,6 @@
 //! `modioctl raw`.
 
-use crate::bus::{Lost, adu, decode};
+use crate::bus::{Lost, adu, decode, is_busy};
 use crate::cli::Raw;
 use crate::device::Device;
 use crate::failure::Failure;
@@ -12,12 +12,16 @@ pub async fn run(device: &mut Device, options: &Raw) -> Result<(), Failure> {
     let framing = device.master.endpoint().framing;
     let sent = adu::bytes(framing, &framing.frame(0, device.unit, &pdu));
     output::line(format_args!("-> {sent}  {}", decode::request(&pdu)))?;
+    let show = |answer: &[u8]| {
+        let frame = adu::bytes(framing, &framing.frame(0, device.unit, answer));
+        let words = decode::response(answer, Some(&pdu));
+        output::line(format_args!("<- {frame}  {words}"))
+    };
     match device.master.ask(device.unit, &pdu).await {
         Ok(answer) => {
-            let frame = adu::bytes(framing, &framing.frame(0, device.unit, &answer));
-            let words = decode::response(&answer, Some(&pdu));
-            output::line(format_args!("<- {frame}  {words}"))?;
+            show(&answer)?;
             match answer[..] {
+                _ if is_busy(&pdu, &answer) => Err(device.busy(&answer, "the request")),
                 [function, code] if function & 0x80 != 0 => {
                     Err(device.exception(code, "the request"))
                 }
@@ -33,7 +37,12 @@ pub async fn run(device: &mut Device, options: &Raw) -> Result<(), Failure> {
             ))?;
             Err(device.lost_after(&pdu, &Lost::Garbled(bytes)))
         }
-        Err(lost) => Err(device.lost_after(&pdu, &lost)),
+        Err(lost) => {
+            if let (Lost::Absent(code), [function, ..]) = (&lost, &pdu[..]) {
+                show(&[function | 0x80, *code])?;
+            }
+            Err(device.lost_after(&pdu, &lost))
+        }
     }
 }
 
