@@ -32,37 +32,41 @@ pub async fn list(device: &mut Device, json: bool) -> Result<(), Failure> {
     let rows = used.iter();
     let rows = rows.map(|(item, words)| [item.name.clone(), sentence(&book, item, words)]);
     output::table(&rows.collect::<Vec<_>>())?;
-    device.warn_of(&book, &values).await
+    device.warn_of(&book, &values).await;
+    Ok(())
 }
 
 impl Device {
-    /// Prints warnings about links, given as their words.
-    async fn warn_of(&mut self, book: &Book, links: &[Vec<u16>]) -> Result<(), Failure> {
-        if links.iter().any(|words| acts(words)) {
-            let timeout = self.read_words(COMM_TIMEOUT, 1).await?;
+    /// Prints warnings about links, given as their words. The command has done its work, so it does not fail when the unit
+    /// does not answer now.
+    async fn warn_of(&mut self, book: &Book, links: &[Vec<u16>]) {
+        if links.iter().any(|words| acts(words))
+            && let Ok(timeout) = self.read_words(COMM_TIMEOUT, 1).await
+        {
             let timeout = timeout.first().copied().unwrap_or_default();
             for warning in of_links(book, links, timeout) {
                 eprintln!("modioctl: warning: {warning}");
             }
         }
-        Ok(())
     }
 
-    /// Prints warnings about all links after these settings were written, if one of them concerns links.
-    pub async fn warn_of_links(&mut self, written: &[(Item, Vec<u16>)]) -> Result<(), Failure> {
+    /// Prints warnings about all links after these settings were written, if one of them concerns links. As
+    /// [`Self::warn_of`], it does not fail.
+    pub async fn warn_of_links(&mut self, written: &[(Item, Vec<u16>)]) {
         let concerns = |item: &Item| {
             let of_source = item.name.ends_with(".range") || item.name.ends_with(".scale");
-            of_source || item.name.contains(".link") || item.address == COMM_TIMEOUT
+            of_source || item.name.contains(".link") || item.name == "COMM_TIMEOUT"
         };
-        if !written.iter().any(|(item, _)| concerns(item)) {
-            return Ok(());
+        if written.iter().any(|(item, _)| concerns(item))
+            && let Ok(book) = fetch_set(self).await
+        {
+            let outputs = book.points();
+            let items = outputs.flat_map(|output| links::of(&book, &output.name));
+            let items: Vec<_> = items.collect();
+            if let Ok(values) = self.read_items(&items).await {
+                self.warn_of(&book, &values).await;
+            }
         }
-        let book = fetch_set(self).await?;
-        let outputs = book.points();
-        let items = outputs.flat_map(|output| links::of(&book, &output.name));
-        let items: Vec<_> = items.collect();
-        let values = self.read_items(&items).await?;
-        self.warn_of(&book, &values).await
     }
 }
 
@@ -111,7 +115,8 @@ pub async fn link(device: &mut Device, text: &str, done: &Note) -> Result<(), Fa
         eprintln!("modioctl: note: {note}");
     }
     let words: Vec<_> = changes.into_iter().map(|(_, words)| words).collect();
-    device.warn_of(&book, &words).await
+    device.warn_of(&book, &words).await;
+    Ok(())
 }
 
 /// Returns the link to write: the link that already has this source, or else the first free link.

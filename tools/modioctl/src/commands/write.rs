@@ -46,7 +46,8 @@ pub async fn run(
         if is_unsaved {
             eprintln!("modioctl: {UNSAVED}");
         }
-        return device.warn_of_links(&checked).await;
+        device.warn_of_links(&checked).await;
+        return Ok(());
     }
     for (item, words) in &checked {
         if let Some(sources) = held.get(&item.name) {
@@ -64,7 +65,8 @@ pub async fn run(
     if is_unsaved {
         output::line(UNSAVED)?;
     }
-    device.warn_of_links(&checked).await
+    device.warn_of_links(&checked).await;
+    Ok(())
 }
 
 impl Device {

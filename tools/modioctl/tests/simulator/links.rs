@@ -53,6 +53,30 @@ fn settings_that_make_a_link_surprising_are_warned_of_by_each_command() {
     );
 }
 
+/// Register 0x0104 is COMM_TIMEOUT of a modio.
+#[test]
+fn write_that_succeeded_does_not_fail_because_of_a_warning() {
+    let mut other = server([]);
+    let at = At::tcp(serve_requests(move |address, pdu| {
+        Some(response(&mut other, address, pdu))
+    }));
+    let ran = at.run("write 0x0104=5");
+    assert_eq!(ran.err, "");
+    ran.fine();
+    // A unit that is switched off after the write.
+    let mut unit = server(modio_02(Module::Do4));
+    let mut is_off = false;
+    let at = At::tcp(serve_requests(move |address, pdu| {
+        if is_off {
+            return Some(Vec::new());
+        }
+        is_off = pdu[..3] == [6, 0x01, 0x04];
+        Some(response(&mut unit, address, pdu))
+    }));
+    at.run("--timeout 100ms --retries 0 write COMM_TIMEOUT=5")
+        .fine();
+}
+
 #[test]
 #[ignore = "needs the simulator: cargo xtask test"]
 fn link_is_written_acts_and_is_listed_until_it_is_deleted() {

@@ -47,7 +47,8 @@ pub async fn run(
             device.unlock().await?;
             write(&mut device, &changes, &mut progress).await?;
             output::line("written, but not saved: save with `modioctl config save`")?;
-            device.warn_of_links(&changes).await
+            device.warn_of_links(&changes).await;
+            Ok(())
         }
         Config::Save => {
             device.unlock().await?;
@@ -75,7 +76,7 @@ pub async fn run(
                 agree(&modules.join(", ")).await?;
             }
             import(&mut device, &wanted, &file, rows.len(), note).await?;
-            device.warn_of_links(&wanted).await?;
+            device.warn_of_links(&wanted).await;
             finish(device, restart).await
         }
         Config::Reset { restart } => {
