@@ -24,6 +24,11 @@ pub fn is_numbered(port: &str) -> bool {
         .any(|kind| name.starts_with(kind))
 }
 
+/// Returns whether the name of a port is that of a USB socket.
+pub fn is_socket(port: &str) -> bool {
+    port.contains("/by-path/")
+}
+
 /// Returns the name in `by-id` for an adapter with a serial number, and else that in `by-path`: adapters of one kind without
 /// serial numbers, or with the same, have one name in `by-id` together.
 fn lasting(ports: &[SerialPortInfo], port: &str, links: &Path) -> Option<String> {

@@ -1,6 +1,6 @@
 //! `modioctl export`.
 
-use crate::adapter::{is_numbered, lasting_name};
+use crate::adapter::{is_numbered, is_socket, lasting_name};
 use crate::bus::Place;
 use crate::cli::Export;
 use crate::device::{Device, fetch};
@@ -45,12 +45,17 @@ pub async fn run(device: &mut Device, options: &Export) -> Result<(), Failure> {
         },
     )?;
     if let Place::Serial(port) = &endpoint.place
-        && is_numbered(port)
         && text.contains(port)
     {
-        eprintln!(
-            "modioctl: warning: {port} can be another adapter after a restart of the computer: see `modioctl ports` for a name that stays"
-        );
+        if is_numbered(port) {
+            eprintln!(
+                "modioctl: warning: {port} can be another adapter after a restart of the computer: see `modioctl ports` for a name that stays"
+            );
+        } else if is_socket(port) {
+            eprintln!(
+                "modioctl: warning: {port} is a USB socket of this computer: another computer has other names, and the adapter must stay in this socket"
+            );
+        }
     }
     output::save(&text, options.output.as_deref(), options.force)
 }
