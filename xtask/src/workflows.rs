@@ -151,7 +151,7 @@ fn job_with_the_key_has_neither_sources_nor_tools_and_runs_for_tags_that_passed_
         sign["env"]["MODIO_SIGNING_KEY"],
         "${{ secrets.MODIO_SIGNING_KEY }}"
     );
-    // It runs nothing but these, so no file of the artifact.
+    // The script starts only these programs, and so no file of the artifact.
     let commands = [
         "set",
         "export",

@@ -8,7 +8,7 @@ pub enum Failure {
     /// The unit answered with an exception.
     #[error("{0}")]
     Refused(String),
-    /// The unit, or a gateway, has no time for a read.
+    /// The unit, or a gateway, has no time for a request, which it may carry out later.
     #[error("{0}")]
     Busy(String),
     /// The command line, a name, a value or a file is wrong.

@@ -1,5 +1,5 @@
 //! What a release needs of git: a commit without changes, and with a tag the tag of this version at this commit, and a
-//! security epoch that follows the one of the tag before.
+//! security epoch that follows the highest one of the tags before.
 
 use std::path::Path;
 use std::process::Command;

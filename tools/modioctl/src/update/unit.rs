@@ -114,7 +114,7 @@ impl Unit {
         }
     }
 
-    /// Returns the unit with the CRC-32 of the image, by which it is told from another build of the same commit.
+    /// Returns the unit with the CRC-32 of the image: two builds of the same commit differ in it.
     #[must_use]
     pub fn of_crc(self, crc: u32) -> Self {
         Self { crc, ..self }

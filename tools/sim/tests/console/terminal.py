@@ -41,7 +41,7 @@ exit 1
 
 
 class Terminal:
-    """A bash in a session of its own. A directory takes the place of /tmp and of the home."""
+    """A bash in a session of its own, with one directory as its /tmp and as its home."""
 
     def __init__(self, directory: pathlib.Path):
         self.directory = directory
@@ -114,8 +114,8 @@ class Terminal:
         limit = time.monotonic() + PATIENCE
         while True:
             printed = output.read_text(errors="replace")
-            if "--http" not in command and (told := re.search(r"^http: http://(.*)/$", printed, re.MULTILINE)):
-                self.http = told[1]
+            if "--http" not in command and (address := re.search(r"^http: http://(.*)/$", printed, re.MULTILINE)):
+                self.http = address[1]
             printed = self.there(printed)
             if not pages.difference(shown, printed) or time.monotonic() > limit:
                 return status, printed

@@ -227,13 +227,19 @@ fn a_unit_that_comes_back_is_updated_and_has_all_the_time_to_restart() {
     assert_eq!(stages(&campaign), [Stage::Done]);
 }
 
+/// Returns a line with a unit whose other slot holds a confirmed image by this key, and the plan to go back to it.
+fn back(key: u32, unicast: bool) -> (Bus, Campaign) {
+    let older = [0x0002, 0, 0, 7, 8, 200, (key >> 16) as u16, key as u16];
+    let mut bus = Bus::new(9600, 1);
+    (bus.units[0].state, bus.units[0].images[1]) = (State::Confirmed, older);
+    let campaign = Campaign::new(&[], vec![Unit::back(1, Slot::B, older)], unicast);
+    (bus, campaign)
+}
+
 #[test]
 fn a_slot_that_has_aged_gets_one_order_to_go_back() {
-    let mut bus = Bus::new(9600, 1);
-    let older = [0x0002, 0, 0, 7, 8, 200, 0, 0];
-    let unit = &mut bus.units[0];
-    (unit.state, unit.flaw, unit.images[1]) = (State::Confirmed, Flaw::Rotten, older);
-    let mut campaign = Campaign::new(&[], vec![Unit::back(1, Slot::B, older)], false);
+    let (mut bus, mut campaign) = back(0, false);
+    bus.units[0].flaw = Flaw::Rotten;
     bus.run(&mut campaign);
     assert_eq!(stages(&campaign), [Stage::Failed(Fault::Aged)]);
     assert_eq!(bus.units[0].orders, [Command::GoBack]);
@@ -276,13 +282,9 @@ fn the_way_back_needs_no_blocks_and_is_confirmed() {
 /// restarted by then, and its lock is closed.
 #[test]
 fn a_repeated_order_to_go_back_is_refused_and_has_been_carried_out() {
-    let mut bus = Bus::new(9600, 1);
-    let older = [0x0002, 0, 0, 7, 8, 200, 0, 0];
-    let unit = &mut bus.units[0];
-    (unit.state, unit.images[1]) = (State::Confirmed, older);
-    unit.restart = std::time::Duration::from_millis(200);
+    let (mut bus, mut campaign) = back(0, true);
+    bus.units[0].restart = std::time::Duration::from_millis(200);
     bus.loses = Some(Command::GoBack);
-    let mut campaign = Campaign::new(&[], vec![Unit::back(1, Slot::B, older)], true);
     bus.run(&mut campaign);
     assert_eq!(stages(&campaign), [Stage::Done]);
     assert_eq!(bus.units[0].orders, [Command::GoBack, Command::Confirm]);
@@ -290,12 +292,9 @@ fn a_repeated_order_to_go_back_is_refused_and_has_been_carried_out() {
 
 #[test]
 fn an_order_to_go_back_that_is_always_refused_is_reported_as_refused() {
-    let mut bus = Bus::new(9600, 1);
-    let older = [0x0002, 0, 0, 7, 8, 200, 0x0101, 0xFFFF];
-    let unit = &mut bus.units[0];
-    (unit.state, unit.images[1]) = (State::Confirmed, older);
-    (unit.keys, unit.revoked) = ([0x0101_FFFF, 0x0202_EEEE], true);
-    let mut campaign = Campaign::new(&[], vec![Unit::back(1, Slot::B, older)], false);
+    let keys = [0x0101_FFFF, 0x0202_EEEE];
+    let (mut bus, mut campaign) = back(keys[0], false);
+    (bus.units[0].keys, bus.units[0].revoked) = (keys, true);
     bus.run(&mut campaign);
     let refused = Fault::Refused("the order to start the image", 6);
     assert_eq!(stages(&campaign), [Stage::Failed(refused)]);
