@@ -138,10 +138,15 @@ impl<const SLOTS: usize> Settings<SLOTS> {
     /// Returns every setting from this address on that differs from its default, in ascending order.
     #[must_use]
     pub fn changed_from(&self, first: u16) -> Changed<'_, SLOTS> {
+        let behind = if Links::<SLOTS>::EXIST {
+            links::LINKS
+        } else {
+            DEADBAND
+        };
         Changed {
             settings: self,
             held: Addresses::from(first),
-            links: first.max(links::LINKS),
+            behind: first.max(behind),
         }
     }
 
@@ -374,7 +379,7 @@ pub struct Changed<'a, const SLOTS: usize> {
     settings: &'a Settings<SLOTS>,
     held: Addresses,
     /// The register of a link, or of DEADBAND behind these, that is next after all others.
-    links: u16,
+    behind: u16,
 }
 
 impl<const SLOTS: usize> Iterator for Changed<'_, SLOTS> {
@@ -392,17 +397,16 @@ impl<const SLOTS: usize> Iterator for Changed<'_, SLOTS> {
                 return Some((address, value));
             }
         }
-        while Links::<SLOTS>::contain(self.links) {
-            let address = self.links;
-            self.links = address.wrapping_add(1);
+        while Links::<SLOTS>::contain(self.behind) {
+            let address = self.behind;
+            self.behind = address.wrapping_add(1);
             if let Some(value) = self.settings.links.changed(address) {
                 return Some((address, value));
             }
         }
-        // DEADBAND follows the links.
-        while has_deadband(self.links) {
-            let address = self.links;
-            self.links = address.wrapping_add(1);
+        while has_deadband(self.behind) {
+            let address = self.behind;
+            self.behind = address.wrapping_add(1);
             let value = self.settings.get(address);
             if value != 0 {
                 return Some((address, value));

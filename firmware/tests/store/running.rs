@@ -4,7 +4,7 @@ use firmware::store::{Given, Saving, Store, WriteError};
 use register_map::board::MODIO_02;
 use register_map::configuration::{COMMAND, HEARTBEAT, KEY, RULES, module_of};
 use register_map::record::OUTPUTS;
-use register_map::{Module, rule_at};
+use register_map::{Module, Rule, deadband};
 
 use crate::flash::{Fault, MockFlash, Noise};
 
@@ -97,15 +97,12 @@ pub fn settings(pairs: &[(u16, u16)]) -> Settings {
 /// settings.
 pub fn random_settings(seed: u64, changed: usize) -> Settings {
     let mut noise = Noise(seed);
-    let rules = RULES
-        .iter()
-        .filter(|rule| ![KEY, COMMAND, HEARTBEAT].contains(&rule.first));
-    let addresses: Vec<u16> = rules.flat_map(|rule| rule.addresses()).collect();
+    let addresses: Vec<_> = addresses().collect();
     let mut pairs = vec![(MODULE_SLOT, noise.next() as u16 % 7)];
     for _ in 0..changed {
-        let address = addresses[noise.next() as usize % addresses.len()];
+        let (rule, address) = addresses[noise.next() as usize % addresses.len()];
         if address != MODULE_SLOT {
-            pairs.extend(some_value(address, &mut noise).map(|value| (address, value)));
+            pairs.extend(some_value(rule, &mut noise).map(|value| (address, value)));
         }
     }
     Settings::load(&MODIO_02, pairs.into_iter()).0
@@ -115,20 +112,22 @@ pub fn random_settings(seed: u64, changed: usize) -> Settings {
 pub fn fullest_settings(seed: u64) -> Settings {
     let mut noise = Noise(seed);
     let mut pairs = vec![(MODULE_SLOT, Module::Ao4.code())];
-    for rule in RULES
-        .iter()
-        .filter(|rule| ![KEY, COMMAND, HEARTBEAT].contains(&rule.first))
-    {
-        for address in rule.addresses().filter(|address| *address != MODULE_SLOT) {
-            pairs.extend(some_value(address, &mut noise).map(|value| (address, value)));
-        }
+    for (rule, address) in addresses().filter(|(_, address)| *address != MODULE_SLOT) {
+        pairs.extend(some_value(rule, &mut noise).map(|value| (address, value)));
     }
     Settings::load(&MODIO_02, pairs.into_iter()).0
 }
 
+/// Returns the addresses of all settings that a board with one slot has, with their rules, in ascending order.
+fn addresses() -> impl Iterator<Item = (&'static Rule, u16)> {
+    let rules = RULES.iter().chain(deadband::RULES);
+    rules
+        .filter(|rule| ![KEY, COMMAND, HEARTBEAT].contains(&rule.first))
+        .flat_map(|rule| rule.addresses().map(move |address| (rule, address)))
+}
+
 /// Returns a random allowed value that is not the default, if a few tries find one.
-fn some_value(address: u16, noise: &mut Noise) -> Option<u16> {
-    let (rule, _) = rule_at(RULES, address)?;
+fn some_value(rule: &Rule, noise: &mut Noise) -> Option<u16> {
     let some = [1, 0xFFFE, 2000, 100, 12, 24, 384, 30, 3, 0, 1];
     let some = some.map(|value: u16| value.wrapping_add(noise.next() as u16 % 2));
     let from = noise.next() as usize % some.len();
