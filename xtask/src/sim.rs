@@ -18,8 +18,7 @@ pub fn run(workspace: &mut Workspace, arguments: &[OsString]) -> Result<()> {
     simulator.args(arguments);
     let asked = command::output(Command::new(program).args(arguments).arg("--missing-files"))?;
     let lines = String::from_utf8_lossy(&asked.stdout);
-    for (kind, board) in lines.lines().filter_map(|line| line.split_once(' ')) {
-        let board: &'static Board = board.parse()?;
+    for (kind, board) in lines.lines().filter_map(missing_file) {
         let file = match kind {
             "loader" => build::loader(workspace, board)?,
             "image" => signed::image(workspace, &signed::Options::of(board), Slot::A)?,
@@ -28,4 +27,30 @@ pub fn run(workspace: &mut Workspace, arguments: &[OsString]) -> Result<()> {
         simulator.arg(format!("--{kind}={board}={}", file.display()));
     }
     command::exec(&mut simulator)
+}
+
+/// Returns kind and board of a file that a line of the simulator names, or `None`: it may print its help instead.
+fn missing_file(line: &str) -> Option<(&str, &'static Board)> {
+    let (kind, board) = line.split_once(' ')?;
+    Some((kind, board.parse().ok()?))
+}
+
+#[cfg(test)]
+mod tests {
+    use register_map::board::MODIO_08;
+
+    use super::*;
+
+    #[test]
+    fn help_and_version_name_no_missing_file() {
+        assert_eq!(missing_file("loader modio-08"), Some(("loader", &MODIO_08)));
+        for line in [
+            "modio-sim 0.3.0-dev",
+            "Usage: modio-sim [OPTIONS]",
+            "",
+            "Options:",
+        ] {
+            assert_eq!(missing_file(line), None, "{line}");
+        }
+    }
 }
