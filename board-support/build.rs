@@ -6,6 +6,7 @@ use std::{env, fs, path::PathBuf};
 
 use register_map::{
     Board,
+    board::MODIO_02,
     layout::{HEADER, LOADER, LOADER_KEYS},
     part::{FLASH_BASE, RAM_BASE},
 };
@@ -27,10 +28,21 @@ fn main() {
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
     println!("cargo::rerun-if-changed=memory");
     println!("cargo::rerun-if-changed=build.rs");
-    if env::var("CARGO_CFG_TARGET_OS").as_deref() != Ok("none") {
-        return;
-    }
-    if let Some(board) = Board::ALL.into_iter().find(|board| is_on(board.name)) {
+    let is_target = env::var("CARGO_CFG_TARGET_OS").as_deref() == Ok("none");
+    let boards: Vec<_> = Board::ALL
+        .into_iter()
+        .filter(|board| is_on(board.name))
+        .collect();
+    let board = match boards[..] {
+        [board] => board,
+        [] if !is_target => &MODIO_02,
+        _ => panic!("exactly one feature of a board is needed, such as {MODIO_02}"),
+    };
+    let module = board.name.replace('-', "_");
+    let selected = format!("pub use {module}::BOARD;\n");
+    fs::write(out.join("board.rs"), selected).expect("OUT_DIR is writable");
+    if is_target {
+        println!("cargo::metadata=BOARD={board}");
         let handlers = || HANDLERS.into_iter().zip(board.memory().interrupts);
         let mut script = memory(board);
         if !is_on("loader") {
@@ -81,7 +93,7 @@ fn memory(board: &Board) -> String {
     } else if is_on("slot-b") {
         slot(1)
     } else {
-        (FLASH_BASE, board.store.first - FLASH_BASE, board.store)
+        (FLASH_BASE, board.store().first - FLASH_BASE, board.store())
     };
     let sections = fs::read_to_string(SECTIONS).expect("the linker script is readable");
     let keys_bytes = FLASH_BASE + LOADER - LOADER_KEYS;

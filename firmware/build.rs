@@ -13,6 +13,9 @@ fn main() {
     if env::var("CARGO_CFG_TARGET_OS").as_deref() != Ok("none") {
         return;
     }
+    // From the build script of board-support.
+    let board = env::var("DEP_MODIO_BOARD_BOARD").expect("a feature of board-support selects it");
+    fs::write(out.join("board.rs"), type_of(&board)).expect("OUT_DIR is writable");
     println!("cargo::rustc-link-arg-bins=--nmagic");
     println!("cargo::rustc-link-arg-bins=-Tlink.x");
     // Functions with the same code are linked once. Nothing compares their addresses.
@@ -21,6 +24,17 @@ fn main() {
     if let Some(map) = env::var_os("MODIO_MAP") {
         println!("cargo::rustc-link-arg-bins=-Map={}", map.display());
     }
+}
+
+/// Returns Rust code with the type of a board in crate register-map, which is its name in other words: `modio-02` is
+/// `Modio02`.
+fn type_of(board: &str) -> String {
+    let words = board.split('-').map(|word| {
+        let (first, rest) = word.split_at(1);
+        first.to_uppercase() + rest
+    });
+    let words: String = words.collect();
+    format!("/// The board of this image.\npub type B = register_map::board::{words};\n")
 }
 
 /// Returns Rust code with the fixed part of each board's self-description: the document without its ports, which

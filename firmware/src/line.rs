@@ -4,45 +4,50 @@
 //! runs from RAM, so that it continues while flash is erased or programmed. Functions that are called from here must be
 //! in RAM, too (`board-support/memory/sections.x`).
 
-use crate::HAS_EVENTS;
 use modbus_server::{
     LineCounters, Reply, Request,
     fast::Contest,
-    line::{Arbitration, Faults, Port, Turn, Windows},
+    line::{Arbitration, FastUnit, Faults, Port, Turn, Units, Windows},
 };
 use ports::line::{GapTimer, Silence, Uart};
+use register_map::board::{Count, Exactly};
 
-/// The unit addresses of a line. Both lines have the same type, so that they share their code.
-#[cfg(not(feature = "small"))]
-pub type Units = modbus_server::line::FastUnit;
-/// The unit address of a line.
-#[cfg(feature = "small")]
-pub type Units = u8;
+/// The unit addresses of both lines of a board, which depend on whether it has events. Both have the same type, so that they
+/// share their code.
+pub trait Addresses: Count {
+    /// The unit addresses of a line.
+    type Units: Units;
 
-/// Returns the addresses of a line, or `None` if it is not served. `is_fast`: it serves function 70, by which a unit
-/// without an address can be found.
-#[must_use]
-#[cfg(not(feature = "small"))]
-pub fn units(unit: Option<u8>, is_fast: bool) -> Option<Units> {
-    let units = Units {
-        unit: unit.unwrap_or_default(),
-        is_fast,
-    };
-    (unit.is_some() || is_fast).then_some(units)
+    /// Returns the addresses of a line, or `None` if it is not served. `is_fast`: it serves function 70, by which a unit
+    /// without an address can be found.
+    fn units(unit: Option<u8>, is_fast: bool) -> Option<Self::Units>;
 }
 
-/// Returns the address of a line, or `None` if it is not served.
-#[must_use]
-#[cfg(feature = "small")]
-pub const fn units(unit: Option<u8>, _is_fast: bool) -> Option<Units> {
-    unit
+impl Addresses for Exactly<0> {
+    type Units = u8;
+
+    fn units(unit: Option<u8>, _is_fast: bool) -> Option<u8> {
+        unit
+    }
+}
+
+impl Addresses for Exactly<1> {
+    type Units = FastUnit;
+
+    fn units(unit: Option<u8>, is_fast: bool) -> Option<FastUnit> {
+        let units = FastUnit {
+            unit: unit.unwrap_or_default(),
+            is_fast,
+        };
+        (unit.is_some() || is_fast).then_some(units)
+    }
 }
 
 /// A line in use.
-pub struct Line<U, G> {
+pub struct Line<U, G, N> {
     uart: U,
     gap: G,
-    port: Port<'static, Units>,
+    port: Port<'static, N>,
     /// Times of an arbitration, and the end of the last request of Fast Modbus.
     windows: Windows,
     ended: Option<u32>,
@@ -57,13 +62,13 @@ pub struct Line<U, G> {
     repaired: bool,
 }
 
-impl<U: Uart, G: GapTimer> Line<U, G> {
+impl<U: Uart, G: GapTimer, N: Units> Line<U, G, N> {
     /// Creates a line that receives. The gap timer measures the port's silences, and the times of `windows` are in its
     /// ticks. A reply that takes more than `longest_ms` milliseconds is aborted.
     pub fn new(
         uart: U,
         mut gap: G,
-        port: Port<'static, Units>,
+        port: Port<'static, N>,
         windows: Windows,
         longest_ms: u16,
     ) -> Self {
@@ -82,7 +87,7 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
     }
 
     /// Sets the unit addresses, which have changed.
-    pub fn set_units(&mut self, units: Units) {
+    pub fn set_units(&mut self, units: N) {
         self.port.set_units(units);
     }
 
@@ -101,7 +106,7 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         if U::received(status) {
             let character = self.uart.read(status);
             let faults = Faults::from_bits(character.faults);
-            if self.port.received(character.byte, faults) && HAS_EVENTS {
+            if self.port.received(character.byte, faults) && N::FAST {
                 // If the UART wants a byte, too, it raises the interrupt again.
                 return self.on_special(character.byte, now_ms());
             }
@@ -144,7 +149,7 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
             Silence::T35 => self.port.long_silence(now_ms),
             Silence::None => false,
         };
-        if HAS_EVENTS && waits {
+        if N::FAST && waits {
             self.ended = None;
             self.passed_ms = 0;
         }
@@ -153,7 +158,7 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
 
     /// Returns whether the line's registers change: a reply is being sent, or the unit arbitrates.
     pub fn is_sending(&self) -> bool {
-        self.port.is_sending() || HAS_EVENTS && self.port.is_arbitrating()
+        self.port.is_sending() || N::FAST && self.port.is_arbitrating()
     }
 
     /// Returns whether a reply has not taken too long, or the driver is off and the end of a frame is measured. An event
@@ -194,7 +199,7 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         if alarms.limit && self.port.is_sending() {
             self.repair();
         }
-        if HAS_EVENTS && alarms.wake {
+        if N::FAST && alarms.wake {
             self.take_turn();
         }
     }

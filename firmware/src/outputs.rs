@@ -4,7 +4,6 @@ use heapless::Vec;
 use register_map::configuration::{RECORD_AFTER_S, RECORD_EVERY_S, RECORDS};
 use register_map::points;
 
-use crate::KEEPS_OUTPUTS;
 use crate::budget::Budget;
 
 /// Number of records that are possible after a power-on: a few, so that a supply that fails again and again does not wear
@@ -12,13 +11,7 @@ use crate::budget::Budget;
 pub const AFTER_POWER_ON: u8 = 4;
 
 /// The values of the outputs that are to start as they were, as pairs of a record.
-pub type Outputs = Vec<(u16, u16), MOST>;
-
-const MOST: usize = if KEEPS_OUTPUTS {
-    points::COUNT as usize
-} else {
-    0
-};
+pub type Outputs = Vec<(u16, u16), { points::COUNT as usize }>;
 
 /// When outputs are compared with the stored ones, and stored if they differ.
 #[derive(Debug)]

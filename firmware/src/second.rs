@@ -16,12 +16,12 @@ use embedded_hal::digital::{InputPin, OutputPin};
 use embedded_hal_nb::serial::{Read, Write};
 use modbus_server::{
     Adu, LineCounters, Reply, Request,
-    line::{Faults, Gaps, Port, Receiver},
+    line::{Faults, Gaps, Port, Receiver, Units},
 };
 use modio_drivers::Lora;
 use ports::uart::LineSettings;
 
-use crate::{config::RadioConfig, line::Units};
+use crate::config::RadioConfig;
 
 mod peer;
 #[cfg(test)]
@@ -61,9 +61,9 @@ const COMPLETE_GAP_MS: u16 = 3;
 const T15_MS: u16 = 3;
 
 /// The second line.
-pub struct SecondLine<P> {
+pub struct SecondLine<P, N> {
     peer: P,
-    port: Port<'static, Units>,
+    port: Port<'static, N>,
     times: Times,
     /// Time since the last byte, in milliseconds, until it has reached the frame gap.
     silence: Option<u16>,
@@ -88,7 +88,7 @@ const BYTE_MS: u16 = 3;
 /// enough, and receive nothing more.
 const LOST_GAP_MS: u16 = 20;
 
-impl<S, M, A> SecondLine<Lora<S, M, A>>
+impl<S, M, A, N: Units> SecondLine<Lora<S, M, A>, N>
 where
     S: Read<u8> + Write<u8>,
     M: OutputPin,
@@ -106,7 +106,7 @@ where
             module,
             frame_gap_ms,
         }: RadioConfig,
-        units: Units,
+        units: N,
         power_on: bool,
         adus: &'static mut [Adu],
     ) -> Self {
@@ -121,18 +121,18 @@ where
     }
 }
 
-impl<S: Read<u8> + Write<u8>> SecondLine<Rs232<S>> {
+impl<S: Read<u8> + Write<u8>, N: Units> SecondLine<Rs232<S>, N> {
     /// Creates the RS-232 line of a unit.
     // Not inlined into init, as above.
     #[inline(never)]
-    pub fn rs232(serial: S, units: Units, adus: &'static mut [Adu]) -> Self {
+    pub fn rs232(serial: S, units: N, adus: &'static mut [Adu]) -> Self {
         Self::new(Rs232(serial), Times::RS232, units, adus)
     }
 }
 
-impl<P: Peer> SecondLine<P> {
+impl<P: Peer, N: Units> SecondLine<P, N> {
     #[inline(always)]
-    fn new(peer: P, times: Times, units: Units, adus: &'static mut [Adu]) -> Self {
+    fn new(peer: P, times: Times, units: N, adus: &'static mut [Adu]) -> Self {
         Self {
             peer,
             port: Port::new(Receiver::rtu(units, false), adus),
@@ -146,7 +146,7 @@ impl<P: Peer> SecondLine<P> {
     }
 
     /// Sets the unit addresses, which have changed.
-    pub fn set_units(&mut self, units: Units) {
+    pub fn set_units(&mut self, units: N) {
         self.port.set_units(units);
     }
 

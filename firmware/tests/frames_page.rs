@@ -16,16 +16,16 @@ use std::fs;
 use std::path::Path;
 
 use firmware::config::{Config, Settings};
-use firmware::device::{Device, Fixed, Identity};
+use firmware::device::{Device, Identity};
 use modbus_server::line::{Faults, Framing, Port, Receiver, Width};
 use modbus_server::{Adu, Exception, Function, Server};
 use modio_drivers::Channels;
-use register_map::board::MODIO_02;
+use register_map::board::Modio02;
 use register_map::{Module, configuration};
 
 /// A modio-02 at unit address 1.
 struct Unit {
-    device: &'static mut Device<1>,
+    device: &'static mut Device<Modio02>,
     server: Server,
     port: Port<'static>,
     is_ascii: bool,
@@ -37,14 +37,13 @@ impl Unit {
         let name = line.split('`').nth(1).expect(line);
         let module: Module = name.parse().expect(line);
         let stored = [(configuration::module_of(5), module.code())];
-        let (settings, _) = Settings::load(&MODIO_02, stored.into_iter());
+        let (settings, _) = Settings::load(stored.into_iter());
         let identity = Identity {
             unit: 1,
             ..Identity::default()
         };
-        let fixed = const { &Fixed::of(&MODIO_02) };
-        let config = Config::new(&MODIO_02, settings, false);
-        let device = Device::new_in(Box::leak(Box::new_uninit()), config, identity, fixed);
+        let config = Config::new(settings, false);
+        let device = Device::new_in(Box::leak(Box::new_uninit()), config, identity);
 
         let mut inputs = Channels::new();
         if line.contains("Inputs 1 and 3 are energised") {

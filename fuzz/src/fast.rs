@@ -17,19 +17,18 @@
 use std::mem::MaybeUninit;
 
 use firmware::config::{Config, LineName, Origin, Settings};
-use firmware::device::{Device, Fixed, Identity};
+use firmware::device::{Device, Identity};
 use modbus_reference::framed;
 use modbus_server::fast::{self, Part};
 use modbus_server::line::{Arbitration, FastUnit, Faults, Framing, Port, Receiver, Turn, Windows};
 use modbus_server::{Adu, Server};
-use register_map::board::MODIO_08;
 use register_map::{Module, configuration};
 
+use crate::B;
 use crate::script::Script;
 
 const UNIT: u8 = 5;
 const SERIAL: u32 = 0x0D00_1234;
-const DESCRIPTION: &Fixed = &Fixed::of(&MODIO_08);
 const MODULES: [Module; 4] = [Module::Di4, Module::Do4, Module::Ai4, Module::Ao4];
 /// An arbitration without a guard: every start bit since the last turn counts.
 const WINDOWS: Windows = Windows {
@@ -41,7 +40,7 @@ const WINDOWS: Windows = Windows {
 
 /// A unit with its end of the line.
 struct Unit<'a> {
-    device: &'a mut Device<4>,
+    device: &'a mut Device<B>,
     server: Server,
     fast: fast::Unit,
     port: Port<'a, FastUnit>,
@@ -51,8 +50,8 @@ struct Unit<'a> {
 /// Target `fast`.
 pub fn run(input: &[u8]) {
     let modules = configuration::modules((1_u16..).zip(MODULES));
-    let (settings, _) = Settings::load(&MODIO_08, modules);
-    let config = Config::new(&MODIO_08, settings, false);
+    let (settings, _) = Settings::load(modules);
+    let config = Config::new(settings, false);
     let identity = Identity {
         unit: UNIT,
         serial_number: SERIAL,
@@ -66,7 +65,7 @@ pub fn run(input: &[u8]) {
         is_fast: true,
     };
     let mut unit = Unit {
-        device: Device::new_in(&mut place, config, identity, DESCRIPTION),
+        device: Device::new_in(&mut place, config, identity),
         server: Server::new(Framing::Rtu),
         fast: fast::Unit::new(SERIAL, UNIT, Part::Everything),
         port: Port::new(Receiver::rtu(units, false), &mut adus),

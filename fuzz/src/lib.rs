@@ -12,6 +12,8 @@
 //!
 //! Every target accepts any bytes.
 
+use register_map::board::Board;
+
 #[path = "../../modbus-server/tests/common/mod.rs"]
 #[allow(missing_docs, clippy::all)] // the tests' own
 pub mod common;
@@ -30,5 +32,8 @@ pub mod script;
 pub mod store;
 pub mod update;
 
+/// A board that has everything: slots, events, START = as it was.
+type B = register_map::board::Modio08;
+
 /// Bytes of a page of the store.
-const PAGE_SIZE: usize = register_map::board::MODIO_02.store.bytes as usize;
+const PAGE_SIZE: usize = B::ROW.store().bytes as usize;

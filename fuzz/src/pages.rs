@@ -2,7 +2,6 @@
 
 use std::fmt;
 
-use register_map::board::MODIO_02;
 use register_map::record::{BEGINNING, OUTPUTS, SEALS};
 
 use crate::PAGE_SIZE;
@@ -99,7 +98,7 @@ impl Found {
     pub fn damaged() -> Self {
         Self {
             invalid: true,
-            ..Self::good(&Settings::defaults(&MODIO_02))
+            ..Self::good(&Settings::defaults())
         }
     }
 }
@@ -137,7 +136,7 @@ pub fn read(pages: &Pages) -> Vec<Found> {
     let Some((first, _)) = all.first() else {
         let vacant = pages.iter().all(|page| is_vacant(page));
         return vec![if vacant {
-            Found::good(&Settings::defaults(&MODIO_02))
+            Found::good(&Settings::defaults())
         } else {
             Found::damaged()
         }];
@@ -170,7 +169,7 @@ fn records(page: &[u8]) -> Vec<(u32, bool, Found)> {
             continue;
         }
         let pairs = (at + 10..end).step_by(4).map(|at| (half(at), half(at + 2)));
-        let (settings, rejected) = Settings::load(&MODIO_02, pairs);
+        let (settings, rejected) = Settings::load(pairs);
         let invalid = false;
         let settings = Found {
             settings,

@@ -14,14 +14,14 @@
 //!           8 a record of outputs   round
 //! ```
 
-use firmware::store::{Page, Store, WriteError};
-use register_map::board::MODIO_02;
+use firmware::store::{Page, WriteError};
 
 use crate::PAGE_SIZE;
 use crate::flash::{Fault, Mess, MockFlash};
 use crate::pages::{self, Found};
 use crate::running::{
-    Loaded, Outputs, Settings, fullest_settings, outputs, random_settings, record, save, stored,
+    Loaded, Outputs, Settings, Store, fullest_settings, outputs, random_settings, record, save,
+    stored,
 };
 use crate::script::Script;
 
@@ -102,7 +102,7 @@ impl Life {
             }
             6 => {
                 let [a, b] = [0; 2].map(|_| (0x0100 | u16::from(script.byte()), script.half()));
-                self.save(&Settings::load(&MODIO_02, [a, b].into_iter()).0);
+                self.save(&Settings::load([a, b].into_iter()).0);
             }
             8 => self.record(&outputs(script.byte().into())),
             _ => {
@@ -120,10 +120,7 @@ impl Life {
         if reads_otherwise && pages::nothing_good(&self.flash.pages) {
             // An interrupted erase may leave data that looks like something stored at one start and like nothing at
             // the next.
-            self.expected = vec![
-                Found::good(&Settings::defaults(&MODIO_02)),
-                Found::damaged(),
-            ];
+            self.expected = vec![Found::good(&Settings::defaults()), Found::damaged()];
         }
     }
 
@@ -132,12 +129,12 @@ impl Life {
         while self.store.is_none() {
             let mut store = Store::open(&self.flash);
             // An interrupted start selects no configuration.
-            self.check(store.load(&MODIO_02, &self.flash));
+            self.check(store.load(&self.flash));
             let prepared = store.prepare(&mut self.flash);
             let outputs = stored(&store, &self.flash);
             assert!(self.outputs.contains(&outputs), "found {outputs:?}");
             if prepared.is_ok() {
-                let found = self.check(store.load(&MODIO_02, &self.flash));
+                let found = self.check(store.load(&self.flash));
                 self.decide(found);
                 self.outputs = vec![outputs];
             }

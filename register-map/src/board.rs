@@ -1,4 +1,7 @@
-//! The boards: a row for each, with its code, its name, its ports and its memory. `board-support` describes the pins.
+//! The boards: a [`Row`] for each, with its code, its name, its ports and its memory; and a type for each, a [`Board`]. The
+//! rows are in `rows.rs`. `board-support` describes the pins.
+
+mod rows;
 
 use core::fmt;
 use core::ops::Range;
@@ -7,12 +10,33 @@ use core::str::FromStr;
 use crate::fixed::FixedPort;
 use crate::kind::Kind;
 use crate::layout::{Layout, TwoPages};
-use crate::part::{KIB, Part, STM32F103C8, STM32F103CB, STM32F103RC, STM32F103VC};
+use crate::part::Part;
 use crate::{BLOCKS, Module, Rule, Text, configuration, deadband, links, points, second};
 
-/// A board that the firmware is built for.
+pub use crate::count::{Count, Each, Exactly};
+use rows::ROWS;
+pub use rows::*;
+
+/// A board as a type, the same on the device and in tests. What a board lacks is a constant in its row, so the compiler
+/// leaves out the code for it, and a count of 0, so that it takes no RAM.
+pub trait Board: Copy + fmt::Debug + Eq + 'static {
+    /// The board.
+    const ROW: &'static Row;
+    /// Its ports with points.
+    type Ports: Count;
+    /// 1 if it has events: function 70 and DEADBAND.
+    type Events: Count;
+    /// 1 if it has START = as it was.
+    type Kept: Count;
+    /// 1 if it has a second line.
+    type Second: Count;
+    /// Number of its ports with points.
+    const PORTS: usize = Self::Ports::COUNT;
+}
+
+/// What a board is, but for its pins, which are in `board-support`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Board {
+pub struct Row {
     /// Name on command lines and in the device identification, such as `modio-02`.
     pub name: &'static str,
     /// Value of register BOARD (0x0205).
@@ -29,8 +53,12 @@ pub struct Board {
     pub switch: bool,
     /// The second line, if there is one.
     pub second: Option<Second>,
-    /// Flash pages that store the configuration, while the application runs without a loader.
-    pub store: TwoPages,
+    /// Function 70 and DEADBAND. The flash of the smallest parts has no room for them: docs/decisions.md.
+    pub events: bool,
+    /// START = as it was. As above.
+    pub keeps_outputs: bool,
+    /// What the image is linked for.
+    pub memory: Memory,
 }
 
 /// What the second line of a board is.
@@ -67,161 +95,9 @@ impl Memory {
     }
 }
 
-/// A board: everything about it but its pins, which are in `board-support`.
-struct Row {
-    name: &'static str,
-    code: u16,
-    model: &'static str,
-    first_port: u16,
-    slots: u16,
-    fixed: &'static [FixedPort],
-    switch: bool,
-    second: Option<Second>,
-    memory: Memory,
-}
-
-/// The memory of both clones of the FX3U.
-const FX3U: Memory = Memory {
-    part: STM32F103VC,
-    smaller: None,
-    stack: 14 * KIB,
-    interrupts: ["UART4", "USART1", "EXTI3"],
-};
-
-const ROWS: [Row; 5] = [
-    // The LLD-ModbusIO-02 with an STM32F103CB, or a C8 on a "Blue Pill": one slot, port 5.
-    Row {
-        name: "modio-02",
-        code: 1,
-        model: "LLD-ModbusIO-02",
-        first_port: 5,
-        slots: 1,
-        fixed: &[],
-        switch: true,
-        second: Some(Second::Radio),
-        memory: Memory {
-            part: STM32F103CB,
-            smaller: Some(STM32F103C8),
-            stack: 9 * KIB,
-            interrupts: ["USART1", "USART3", "EXTI3"],
-        },
-    },
-    // The larger board with an STM32F103RC: four slots, ports 1 to 4.
-    Row {
-        name: "modio-08",
-        code: 2,
-        model: "modio-08",
-        first_port: 1,
-        slots: 4,
-        fixed: &[],
-        switch: true,
-        second: Some(Second::Radio),
-        memory: Memory {
-            part: STM32F103RC,
-            smaller: None,
-            stack: 11 * KIB,
-            interrupts: ["USART1", "USART3", "EXTI3"],
-        },
-    },
-    // The FX3U-14MR's clone: an STM32F103VC.
-    Row {
-        name: "fx3u-14",
-        code: 3,
-        model: "FX3U-14MR",
-        first_port: 1,
-        slots: 7,
-        fixed: &[
-            FixedPort::new(Module::Di4, 4),
-            FixedPort::new(Module::Di4, 4),
-            FixedPort::new(Module::Do4, 4),
-            FixedPort::new(Module::Do4, 2),
-            FixedPort::new(Module::Ai4, 4).currents(0b1000),
-            FixedPort::new(Module::Ai4, 4).currents(0b0011),
-            FixedPort::new(Module::Ao4, 2),
-        ],
-        switch: false,
-        second: Some(Second::Rs232),
-        memory: FX3U,
-    },
-    // The FX3U-24MR's clone: an STM32F103VC.
-    Row {
-        name: "fx3u-24",
-        code: 4,
-        model: "FX3U-24MR",
-        first_port: 1,
-        slots: 8,
-        fixed: &[
-            FixedPort::new(Module::Di4, 4),
-            FixedPort::new(Module::Di4, 4),
-            FixedPort::new(Module::Di4, 4),
-            FixedPort::new(Module::Di4, 4),
-            FixedPort::new(Module::Do4, 4),
-            FixedPort::new(Module::Do4, 4),
-            FixedPort::new(Module::Do4, 2),
-            FixedPort::new(Module::Ai4, 4)
-                .currents(0b1000)
-                .or(Module::Ai2Ao2),
-        ],
-        switch: false,
-        second: Some(Second::Rs232),
-        memory: FX3U,
-    },
-    // The "eth_modbus_io5r": an STM32F103CB.
-    Row {
-        name: "eth-io5r",
-        code: 5,
-        model: "eth_modbus_io5r",
-        first_port: 1,
-        slots: 4,
-        fixed: &[
-            FixedPort::new(Module::Di4, 4),
-            FixedPort::new(Module::Di4, 2),
-            FixedPort::new(Module::Do4, 4),
-            FixedPort::new(Module::Do4, 1),
-        ],
-        switch: false,
-        second: None,
-        memory: Memory {
-            part: STM32F103CB,
-            smaller: None,
-            stack: 9 * KIB,
-            interrupts: ["USART2", "USART3", "EXTI2"],
-        },
-    },
-];
-
 impl Row {
-    const fn board(&self) -> Board {
-        let part = self.memory.least();
-        Board {
-            name: self.name,
-            code: self.code,
-            model: self.model,
-            first_port: self.first_port,
-            slots: self.slots,
-            fixed: self.fixed,
-            switch: self.switch,
-            second: self.second,
-            store: TwoPages::before(part.flash, &part),
-        }
-    }
-}
-
-/// The modio-02.
-pub const MODIO_02: Board = ROWS[0].board();
-/// The modio-08.
-pub const MODIO_08: Board = ROWS[1].board();
-/// The fx3u-14.
-pub const FX3U_14: Board = ROWS[2].board();
-/// The fx3u-24.
-pub const FX3U_24: Board = ROWS[3].board();
-/// The eth-io5r.
-pub const ETH_IO5R: Board = ROWS[4].board();
-
-impl Board {
     /// All boards, in the order of their codes.
-    pub const ALL: [&'static Self; ROWS.len()] =
-        [&MODIO_02, &MODIO_08, &FX3U_14, &FX3U_24, &ETH_IO5R];
+    pub const ALL: [&'static Self; ROWS.len()] = ROWS;
 
     /// Every code of register BOARD with the board's name.
     pub const NAMES: [(u16, &'static str); Self::ALL.len()] = {
@@ -236,15 +112,15 @@ impl Board {
 
     /// Returns the memory of the board.
     #[must_use]
-    pub const fn memory(&self) -> &'static Memory {
-        let mut rows: &[Row] = const { &ROWS };
-        while let [row, others @ ..] = rows {
-            if row.code == self.code {
-                return &row.memory;
-            }
-            rows = others;
-        }
-        panic!("every board comes from a row")
+    pub const fn memory(&self) -> &Memory {
+        &self.memory
+    }
+
+    /// Returns the flash pages that store the configuration, while the application runs without a loader.
+    #[must_use]
+    pub const fn store(&self) -> TwoPages {
+        let part = self.memory.least();
+        TwoPages::before(part.flash, &part)
     }
 
     /// Returns where loader, images, boot state and configuration are in the flash of the board's part.
@@ -285,7 +161,7 @@ impl Board {
         let registers = blocks.flat_map(|block| block.registers());
         let registers = registers.filter(|(rule, _)| self.has(rule.first));
         registers.map(|register| match register.0.first {
-            configuration::START if self.is_small() => {
+            configuration::START if !self.keeps_outputs => {
                 let (rule, text) = &configuration::PLAIN_START;
                 (rule, text)
             }
@@ -293,11 +169,41 @@ impl Board {
         })
     }
 
-    /// Returns whether the firmware of the board leaves out function 70, DEADBAND and START = as it was, for which the flash
-    /// of the smallest parts has no room: feature `small`.
+    /// Returns whether its inputs and outputs are on modules in slots. If not, they are part of the board.
+    #[inline(always)]
     #[must_use]
-    pub const fn is_small(&self) -> bool {
-        self.memory().part.flash <= 128 * KIB
+    pub const fn is_modular(&self) -> bool {
+        self.fixed.is_empty()
+    }
+
+    /// Returns whether inputs can switch outputs.
+    #[inline(always)]
+    #[must_use]
+    pub const fn has_links(&self) -> bool {
+        links::exist(self.slots as usize)
+    }
+
+    /// Returns the rules of the configuration.
+    #[inline(always)]
+    #[must_use]
+    pub fn rules(&self) -> &'static [Rule] {
+        if self.keeps_outputs {
+            configuration::RULES
+        } else {
+            configuration::PLAIN_RULES
+        }
+    }
+
+    /// Returns whether it can have analog inputs.
+    #[must_use]
+    pub const fn has_analog_inputs(&self) -> bool {
+        let mut ports = self.fixed;
+        let mut has = self.is_modular();
+        while let [port, others @ ..] = ports {
+            has |= matches!(port.module, Module::Ai4);
+            ports = others;
+        }
+        has
     }
 
     /// Returns whether the second line is a radio.
@@ -314,8 +220,8 @@ impl Board {
             configuration::UNIT => !self.switch,
             configuration::LORA..=configuration::LORA_FRAME_GAP => self.has_radio(),
             second::BUS_MESSAGES..=second::T15_GAPS => self.second.is_some(),
-            _ if deadband::contain(address) => !self.is_small(),
-            _ => links::exist(self.slots as usize) || !links::contain(address),
+            _ if deadband::contain(address) => self.events,
+            _ => self.has_links() || !links::contain(address),
         }
     }
 
@@ -329,7 +235,7 @@ impl Board {
     /// Returns whether MODULE of a port, 1 to 8, can be written.
     #[must_use]
     pub fn chooses(&self, port: u16) -> bool {
-        self.fixed.is_empty() || self.fixed(port).is_some_and(|port| port.or.is_some())
+        self.is_modular() || self.fixed(port).is_some_and(|port| port.or.is_some())
     }
 
     /// Returns whether MODULE of a port, 1 to 8, may have this value. A port without points has no module.
@@ -337,7 +243,7 @@ impl Board {
     pub fn takes(&self, port: u16, code: u16) -> bool {
         match self.fixed(port) {
             Some(fixed) => fixed.takes(code),
-            None => code == 0 || self.fixed.is_empty() && self.has_slot(port),
+            None => code == 0 || self.is_modular() && self.has_slot(port),
         }
     }
 
@@ -374,7 +280,7 @@ const fn same(one: &[u8], other: &[u8]) -> bool {
     }
 }
 
-impl fmt::Display for Board {
+impl fmt::Display for Row {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.name)
     }
@@ -387,7 +293,7 @@ pub struct UnknownBoard;
 impl fmt::Display for UnknownBoard {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("not a board; one of")?;
-        for (i, board) in Board::ALL.iter().enumerate() {
+        for (i, board) in Row::ALL.iter().enumerate() {
             write!(f, "{} {board}", if i == 0 { "" } else { "," })?;
         }
         Ok(())
@@ -396,11 +302,11 @@ impl fmt::Display for UnknownBoard {
 
 impl core::error::Error for UnknownBoard {}
 
-impl FromStr for &'static Board {
+impl FromStr for &'static Row {
     type Err = UnknownBoard;
 
     fn from_str(name: &str) -> Result<Self, Self::Err> {
-        Board::named(name).ok_or(UnknownBoard)
+        Row::named(name).ok_or(UnknownBoard)
     }
 }
 
@@ -413,13 +319,13 @@ mod tests {
 
     #[test]
     fn a_board_is_found_by_its_code_and_its_name() {
-        for board in Board::ALL {
-            assert_eq!(Board::from_code(board.code), Some(board));
+        for board in Row::ALL {
+            assert_eq!(Row::from_code(board.code), Some(board));
             assert_eq!(board.to_string().parse(), Ok(board));
         }
-        assert_eq!(Board::from_code(0), None);
-        let error = "nucleo".parse::<&Board>().unwrap_err();
-        let names = Board::ALL.map(|board| board.name).join(", ");
+        assert_eq!(Row::from_code(0), None);
+        let error = "nucleo".parse::<&Row>().unwrap_err();
+        let names = Row::ALL.map(|board| board.name).join(", ");
         assert_eq!(
             error.to_string(),
             std::format!("not a board; one of {names}")
@@ -430,28 +336,27 @@ mod tests {
     fn slots_are_at_the_ports_of_the_hardware() {
         assert_eq!(MODIO_02.points(), 0x10..0x14);
         assert_eq!(MODIO_08.points(), 0x00..0x10);
-        let slots = |board: &Board| (0..10).filter(|port| board.has_slot(*port)).count();
+        let slots = |board: &Row| (0..10).filter(|port| board.has_slot(*port)).count();
         assert_eq!((slots(&MODIO_02), slots(&MODIO_08)), (1, 4));
         assert!(MODIO_02.ports().eq([5]) && MODIO_08.ports().eq(1..=4));
     }
 
     #[test]
     fn start_as_it_was_exists_on_boards_that_keep_outputs() {
-        for board in Board::ALL {
+        for board in Row::ALL {
             let start = |(rule, _): &(&Rule, &Text)| rule.first == configuration::START;
             let (rule, text) = board.registers().find(start).unwrap();
             let kinds = [Kind::BitOutput, Kind::WordOutput];
             let allowed = kinds.map(|kind| rule.values_for(kind).allow(configuration::AS_IT_WAS));
-            assert_eq!(allowed, [!board.is_small(); 2], "{board}");
-            assert_eq!(text.about.contains("as it was"), !board.is_small());
+            assert_eq!(allowed, [board.keeps_outputs; 2], "{board}");
+            assert_eq!(text.about.contains("as it was"), board.keeps_outputs);
             assert_eq!((text.name, rule.count), ("START", 32));
         }
-        assert!(!MODIO_08.is_small() && MODIO_02.is_small());
     }
 
     #[test]
     fn store_is_in_the_last_pages_of_the_smallest_part() {
-        assert_eq!(MODIO_02.store.addresses(), [0x0800_F800, 0x0800_FC00]);
-        assert_eq!(MODIO_08.store.addresses(), [0x0803_F000, 0x0803_F800]);
+        assert_eq!(MODIO_02.store().addresses(), [0x0800_F800, 0x0800_FC00]);
+        assert_eq!(MODIO_08.store().addresses(), [0x0803_F000, 0x0803_F800]);
     }
 }

@@ -49,11 +49,8 @@ const FILTER_OF_A_WORD: Narrower =
 const RANGE_OF_AN_OUTPUT: Narrower = Narrower::new(WordOutput, Values::up_to(1), 0);
 
 const SAFE_RULE: Rule = Rule::now(Values::up_to(RAW_MAX).or(HOLD), 0).but(&SAFE_OF_A_BIT);
-const START_RULE: Rule = if cfg!(feature = "small") {
-    PLAIN_START_RULE
-} else {
-    Rule::restart(Values::up_to(RAW_MAX).or(AS_IT_WAS), 0).but(&START_OF_A_BIT)
-};
+const START_RULE: Rule =
+    Rule::restart(Values::up_to(RAW_MAX).or(AS_IT_WAS), 0).but(&START_OF_A_BIT);
 const PLAIN_START_RULE: Rule = Rule::restart(Values::up_to(RAW_MAX), 0).but(&PLAIN_START_OF_A_BIT);
 const FILTER_RULE: Rule =
     Rule::now(Values::up_to(DEBOUNCE_MAX_MS), DEBOUNCE_DEFAULT_MS).but(&FILTER_OF_A_WORD);
@@ -133,6 +130,19 @@ pub(crate) static PLAIN_START: (Rule, Text) = (
         about: " Output at power-on, raw",
     },
 );
+
+/// The rules of such a board, otherwise those of [`RULES`].
+pub(crate) static PLAIN_RULES: &[Rule] = &{
+    let mut rules = [PLAIN_START_RULE.at(START, points::COUNT); ROWS.len()];
+    let mut i = 0;
+    while i < rules.len() {
+        if ROWS[i].first != START {
+            rules[i] = ROWS[i];
+        }
+        i += 1;
+    }
+    rules
+};
 
 /// MODULE of a port, 1 to 8.
 #[inline]

@@ -29,6 +29,7 @@ pub mod board;
 pub mod codes;
 mod commit;
 pub mod configuration;
+mod count;
 pub mod counters;
 pub mod deadband;
 pub mod edges;
@@ -52,7 +53,7 @@ mod value;
 mod values;
 
 pub use block::{Block, Scope, Text};
-pub use board::Board;
+pub use board::Row as Board;
 pub use commit::first_32_bits;
 pub use fixed::FixedPort;
 #[doc(hidden)]

@@ -129,7 +129,8 @@ pub fn program(
     let target = target(&workspace.target, board);
     let mut cargo = workspace.target_cargo("build")?;
     cargo.args(["--profile", PROFILE, "--package", package]);
-    cargo.args(["--bin", name, "--features", board.name]);
+    cargo.args(["--bin", name]);
+    cargo.args(["--features", &format!("board,board-support/{board}")]);
     if let Some(letter) = slot {
         cargo.args(["--features", &format!("slot-{letter}")]);
     }

@@ -395,8 +395,8 @@ fn write_store(out: &mut impl Write) -> Result {
             out,
             "{separator}on the {board} those at {first:#010X} and {second:#010X}"
         )?;
-        if board.store != loaded {
-            let [first, second] = board.store.addresses();
+        if board.store() != loaded {
+            let [first, second] = board.store().addresses();
             write!(out, " (without a loader {first:#010X} and {second:#010X})")?;
         }
     }

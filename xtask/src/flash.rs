@@ -117,8 +117,8 @@ fn settings(
 ) -> Result<Option<(u32, Vec<u8>)>> {
     let layout = board.layout();
     let (from, to) = match is_alone {
-        true => (layout.store, board.store),
-        false => (board.store, layout.store),
+        true => (layout.store, board.store()),
+        false => (board.store(), layout.store),
     };
     if from == to {
         return Ok(None);
@@ -129,7 +129,7 @@ fn settings(
     }
     let pages = read(first, 2 * bytes)?;
     let mut pages_of = pages.chunks(bytes as usize);
-    let holds_settings = pages_of.any(|page| record::records(page).next().is_some());
+    let holds_settings = pages_of.any(|page| record::records(page, board).next().is_some());
     Ok(holds_settings.then_some((to.first, pages)))
 }
 

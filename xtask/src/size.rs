@@ -89,7 +89,7 @@ fn of(elf: &Path) -> Result<Sizes> {
 pub fn limit(board: &Board, slot: Option<Slot>) -> Bytes {
     let flash = match slot {
         Some(_) => board.layout().slot - HEADER,
-        None => board.store.first - FLASH_BASE,
+        None => board.store().first - FLASH_BASE,
     };
     let memory = board.memory();
     [flash, memory.least().ram - memory.stack]

@@ -236,7 +236,10 @@ fn for_target(
 ) -> Result<Command> {
     let mut cargo = workspace.target_cargo(subcommand)?;
     cargo.args(["--profile", build::PROFILE]);
-    cargo.args(["--features", &format!("{program}/{board}")]);
+    cargo.args([
+        "--features",
+        &format!("{program}/board,board-support/{board}"),
+    ]);
     Ok(cargo)
 }
 

@@ -4,18 +4,28 @@
 //! A cargo feature with the board's name selects the board. [`board`](crate::board) holds what all boards share:
 //! the DACs' bus on PB6 and PB7.
 
-pub mod eth_io5r;
 mod fx3u;
-pub mod fx3u_14;
-pub mod fx3u_24;
-pub mod modio_02;
-pub mod modio_08;
 
 use crate::{
     gesture::Gesture,
     pin::{Pin, Port},
     usart::Usart,
 };
+
+/// Declares a module for each board, and checks its descriptor.
+macro_rules! boards {
+    ($($board:ident)+) => {
+        $(
+            pub mod $board;
+            const _: () = $board::BOARD.check();
+        )+
+    };
+}
+
+boards! { eth_io5r fx3u_14 fx3u_24 modio_02 modio_08 }
+
+// `BOARD`: the descriptor of the board whose feature is on. Tests without a feature are those of the modio-02.
+include!(concat!(env!("OUT_DIR"), "/board.rs"));
 
 /// A board.
 #[derive(Clone, Copy, Debug)]
@@ -252,36 +262,6 @@ impl Descriptor {
     }
 }
 
-const _: () = eth_io5r::BOARD.check();
-const _: () = fx3u_14::BOARD.check();
-const _: () = fx3u_24::BOARD.check();
-const _: () = modio_02::BOARD.check();
-const _: () = modio_08::BOARD.check();
-
-// Set exactly one board feature. With two features BOARD is defined twice, without one it is not defined. Tests without a
-// feature are those of the modio-02.
-#[cfg(feature = "eth-io5r")]
-pub use eth_io5r::BOARD;
-#[cfg(feature = "fx3u-14")]
-pub use fx3u_14::BOARD;
-#[cfg(feature = "fx3u-24")]
-pub use fx3u_24::BOARD;
-#[cfg(any(
-    feature = "modio-02",
-    all(
-        test,
-        not(any(
-            feature = "modio-08",
-            feature = "eth-io5r",
-            feature = "fx3u-14",
-            feature = "fx3u-24"
-        ))
-    )
-))]
-pub use modio_02::BOARD;
-#[cfg(feature = "modio-08")]
-pub use modio_08::BOARD;
-
 /// Number of LEDs of the board.
 #[cfg(target_os = "none")]
 pub const LEDS: usize = BOARD.leds.len();
@@ -289,3 +269,20 @@ pub const LEDS: usize = BOARD.leds.len();
 /// Number of slots of the board.
 #[cfg(target_os = "none")]
 pub const SLOTS: usize = BOARD.slots.len();
+
+#[cfg(test)]
+mod tests {
+    use register_map::board::Row;
+
+    #[test]
+    fn features_of_the_package_are_the_rows_and_what_is_linked() {
+        let manifest = include_str!("../../Cargo.toml");
+        let (_, features) = manifest.split_once("[features]").unwrap();
+        let (features, _) = features.split_once("\n[").unwrap();
+        let names = features
+            .lines()
+            .filter_map(|line| line.strip_suffix(" = []"));
+        let boards = Row::ALL.iter().map(|board| board.name);
+        assert!(names.eq(boards.chain(["loader", "slot-a", "slot-b"])));
+    }
+}

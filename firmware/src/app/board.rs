@@ -1,40 +1,42 @@
 //! The board of this image, as it appears in the register map and the self-description.
 
 use board_support::boards::{self, AddressPins, PortKind, SlotPins};
-use firmware::{HAS_SLOTS, device::Fixed};
-use register_map::{Board, FixedPort, Module, board::Second, layout::Layout};
-
-/// The board's row in the register map, found by name.
-pub const BOARD: &Board = match Board::named(boards::BOARD.name) {
-    Some(board) => board,
-    None => panic!("the register map has no row for this board"),
+use firmware::line::Addresses;
+use register_map::{
+    FixedPort, Module,
+    board::{Board, Row, Second},
+    layout::Layout,
 };
+
+// `B`, the type of the board of this image: the one whose feature of board-support is on.
+include!(concat!(env!("OUT_DIR"), "/board.rs"));
+
+/// Its row in the register map.
+pub const BOARD: &Row = B::ROW;
 
 /// Where the images are in flash.
 pub const LAYOUT: &Layout = &BOARD.layout();
 
-/// The fixed part of the self-description of every unit with this board.
-pub const DESCRIPTION: &Fixed = &Fixed::of(BOARD);
+/// The device.
+pub type Device = firmware::device::Device<B>;
 
-/// The device with this board's number of slots.
-pub type Device = firmware::device::Device<{ boards::SLOTS }>;
+/// The unit addresses of a line.
+pub type Units = <Events as Addresses>::Units;
 
-/// The settings of this board.
-pub type Settings = firmware::config::Settings<{ boards::SLOTS }>;
+/// Whether the board has events.
+pub type Events = <B as Board>::Events;
 
 // The register map and the pin descriptor mean the same board.
 const _: () = {
     assert!(BOARD.slots as usize == boards::SLOTS);
     assert!(BOARD.switch == matches!(boards::BOARD.address, AddressPins::Switch(_)));
-    assert!(BOARD.is_small() == cfg!(feature = "small"));
     assert!(match (BOARD.second, boards::BOARD.second) {
         (Some(Second::Radio), Some(pins)) => pins.radio.is_some(),
         (Some(Second::Rs232), Some(pins)) => pins.radio.is_none(),
         (None, None) => true,
         _ => false,
     });
-    assert!(BOARD.has_radio() == HAS_SLOTS);
-    assert!(BOARD.fixed.is_empty() == boards::BOARD.has_slots());
+    assert!(BOARD.is_modular() == boards::BOARD.has_slots());
     let mut port = 0;
     while port < BOARD.fixed.len() {
         let SlotPins { lines, kind } = boards::BOARD.slots[port];

@@ -114,7 +114,7 @@ impl AnalogOutputs {
 
 /// Configures every slot for its module.
 pub fn install(
-    modules: [Module; SLOTS],
+    modules: &[Module],
     sampler: &mut Sampler,
     bus: DacBus,
     own: Option<OwnDac>,
@@ -125,7 +125,7 @@ pub fn install(
     });
     let installed = array::from_fn(|index| {
         Installed::new(
-            modules[index],
+            modules.get(index).copied().unwrap_or(Module::None),
             &BOARD.slots[index],
             &mut sampler.inputs[index],
         )

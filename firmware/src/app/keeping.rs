@@ -6,7 +6,6 @@ use core::array;
 use board_support::{boards::SLOTS, kept};
 use firmware::kept_outputs::half_word_of;
 use modio_drivers::{CHANNELS, Channels, Code, DacLink, Kind};
-use register_map::links;
 
 use crate::board::{BOARD, Device};
 
@@ -30,7 +29,7 @@ impl Kept {
             }),
             held: [device.held_outputs(), device.outputs_at_safe()],
         };
-        if links::exist(SLOTS) {
+        if BOARD.has_links() {
             for (slot, ((port, outputs), dac)) in
                 ports.iter().zip(&kept.outputs).zip(dacs).enumerate()
             {
@@ -38,7 +37,7 @@ impl Kept {
             }
             kept::keep_held(kept.held);
         }
-        let modules = if links::exist(SLOTS) {
+        let modules = if BOARD.has_links() {
             device.modules_in_force()
         } else {
             0

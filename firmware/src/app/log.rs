@@ -2,8 +2,8 @@
 //! reads it, further lines are dropped; the firmware never waits. docs/architecture.md describes the lines;
 //! docs/decisions.md says why they are text.
 
-use board_support::{ClockSource, boards::SLOTS, design::CRYSTAL_FAULTS, fault};
-use firmware::{HAS_SLOTS, config, start_up::Address};
+use board_support::{ClockSource, design::CRYSTAL_FAULTS, fault};
+use firmware::{config, start_up::Address};
 use heapless::String;
 use modio_drivers::ModuleError;
 use register_map::{
@@ -36,12 +36,12 @@ pub enum Event {
 }
 
 /// Data that is logged when the device starts.
-pub struct Start {
+pub struct Start<'a> {
     pub address: Address,
     pub dip: u8,
     pub line: config::LineConfig,
     /// The module of each slot.
-    pub modules: [Module; SLOTS],
+    pub modules: &'a [Module],
     pub clock: ClockSource,
     pub reset_cause: u8,
     pub faults: fault::FaultRecord,
@@ -117,7 +117,7 @@ impl Log {
     }
 
     /// Logs how the device starts.
-    pub fn start(&mut self, start: &Start) {
+    pub fn start(&mut self, start: &Start<'_>) {
         let format = start.line.format.name();
         let baud = start.line.baud;
         let mode = match start.line.mode {
@@ -162,7 +162,7 @@ impl Log {
             let text = "WARN the stored settings are damaged: defaults are in force";
             self.write(&mut Line::of(text));
         }
-        for (port, module) in BOARD.ports().zip(start.modules) {
+        for (port, module) in BOARD.ports().zip(start.modules.iter().copied()) {
             self.write(Line::of("").slot(port).text(module.name()));
         }
     }
@@ -187,7 +187,7 @@ impl Log {
             Event::SaveFailed => line.text("WARN the flash could not be written"),
             Event::LineRepaired => line.text("WARN line: set up again"),
             // The board has none.
-            Event::Radio(_) if !HAS_SLOTS => &mut line,
+            Event::Radio(_) if !BOARD.has_radio() => &mut line,
             Event::Radio(true) => line.text("radio: ready"),
             Event::Radio(false) => line.text("WARN radio: ").text(SILENT),
             Event::LowSupply => line.text("WARN the supply is too low for the flash"),

@@ -3,9 +3,9 @@
 //! While the supply is too low for the flash, a save waits, before its first operation or between two operations.
 //! It continues once the supply has recovered. Until then another save is rejected as busy.
 
-use board_support::{Flash, boards::SLOTS, flash::FlashError, kept};
+use board_support::{Flash, flash::FlashError, kept};
 use firmware::{
-    KEEPS_OUTPUTS,
+    config::Settings,
     device::Restart,
     outputs::Schedule,
     store::{Given, Operation, Saving, Store, WriteError},
@@ -13,15 +13,15 @@ use firmware::{
 use rtic::Mutex;
 
 use crate::{
-    board::{BOARD, Device, Settings},
+    board::{B, BOARD, Device},
     log::Event,
 };
 
 /// The store, and a save under way.
 pub struct Persistence {
-    store: Store,
+    store: Store<B>,
     pages: Flash,
-    saving: Option<Saving>,
+    saving: Option<Saving<B>>,
     /// The operation of the save that the flash refused because of a low supply.
     refused: Option<Operation>,
     /// The low supply has been logged.
@@ -34,7 +34,7 @@ pub struct Persistence {
 
 impl Persistence {
     /// `erase`: the start could not erase the page that is no longer needed.
-    pub fn new(store: Store, pages: Flash, erase: bool) -> Self {
+    pub fn new(store: Store<B>, pages: Flash, erase: bool) -> Self {
         Self {
             store,
             pages,
@@ -42,7 +42,11 @@ impl Persistence {
             refused: None,
             low: false,
             erase,
-            schedule: Schedule::new(if KEEPS_OUTPUTS { kept::records() } else { 0 }),
+            schedule: Schedule::new(if BOARD.keeps_outputs {
+                kept::records()
+            } else {
+                0
+            }),
         }
     }
 
@@ -54,7 +58,7 @@ impl Persistence {
         if !self.erase {
             if device.lock(|device| device.config.is_saving()) {
                 event = self.save(device);
-            } else if KEEPS_OUTPUTS {
+            } else if BOARD.keeps_outputs {
                 let now = device.lock(|device| device.state.millis());
                 if self.schedule.is_due(now) {
                     self.record(device);
@@ -117,7 +121,7 @@ impl Persistence {
         let Some(mut saving) = saving else {
             return;
         };
-        let given: Given<'_, SLOTS> = Given::Outputs(&outputs);
+        let given = Given::Outputs(&outputs);
         while let Some(operation) = saving.next(&self.pages, given) {
             if operation.perform(&mut self.pages).is_err() {
                 break;
@@ -192,19 +196,19 @@ impl Persistence {
 
     /// Reports the settings as not stored.
     fn fail(&mut self, device: &mut impl Mutex<T = &'static mut Device>) {
-        let stored = self.store.load(BOARD, &self.pages).settings;
+        let stored = self.store.load(&self.pages).settings;
         device.lock(|device| device.config.save_failed(stored));
     }
 
     /// Reports the settings as stored. Compares them outside the lock, so that requests do not wait.
-    fn end(settings: &Settings, device: &mut impl Mutex<T = &'static mut Device>) {
+    fn end(settings: &Settings<B>, device: &mut impl Mutex<T = &'static mut Device>) {
         let started = device.lock(|device| device.config.started());
         let changed = settings.needs_restart(&started);
         device.lock(|device| device.config.end_save(changed));
     }
 
     /// Keeps a save until the supply has recovered. Returns the event to log, once.
-    fn wait(&mut self, saving: Saving) -> Option<Event> {
+    fn wait(&mut self, saving: Saving<B>) -> Option<Event> {
         self.saving = Some(saving);
         let is_low = !self.pages.has_supply();
         (is_low && !core::mem::replace(&mut self.low, true)).then_some(Event::LowSupply)

@@ -4,11 +4,10 @@ use board_support::{Sampler, boards::SLOTS, device::interrupt, kept};
 use firmware::{alive, device::IoPort, leds::TICK_MS};
 use heapless::spsc::Producer;
 use modio_drivers::{CHANNELS, Channels, DacLink, ModuleError};
-use register_map::links;
 use rtic::Mutex;
 
 use crate::{
-    board::{BOARD, Device},
+    board::{B, BOARD, Device},
     clock,
     every::Every,
     installed::Installed,
@@ -78,7 +77,7 @@ impl Scanning {
             (passed, passed > 0 && device.tick(passed))
         });
         let beat = passed > 0;
-        if beat && links::exist(SLOTS) {
+        if beat && BOARD.has_links() {
             // Under a lock for each slot, because requests wait for it.
             (0..SLOTS).for_each(|slot| device.lock(|device| device.run_links(slot)));
         }
@@ -112,7 +111,7 @@ impl Scanning {
             {
                 *result = module.driver().drive_outputs(channels, dac);
             }
-            if links::exist(SLOTS) {
+            if BOARD.has_links() {
                 self.kept.keep(&channels, &pulsing, dacs, held);
             }
         });
@@ -199,7 +198,7 @@ impl Scanning {
 }
 
 /// Stores which channels failed. Returns whether that differs from before.
-fn take_failures(port: &mut IoPort, result: Result<(), ModuleError>, beat: bool) -> bool {
+fn take_failures(port: &mut IoPort<B>, result: Result<(), ModuleError>, beat: bool) -> bool {
     let before = port.failing();
     let failed = result.map_or_else(ModuleError::channels, |()| 0);
     // Only a scan that also reads the inputs can show that a channel works again.

@@ -11,28 +11,27 @@
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
-#[cfg(feature = "slots")]
-use board_support::RadioIo;
-use board_support::{Damaged, SecondOff, SecondProof, SecondUart, device::interrupt, pac};
+use board_support::{
+    Damaged, IoPin, RadioIo, SecondOff, SecondProof, SecondUart, device::interrupt, fitted::If, pac,
+};
 use embedded_hal_nb::serial::{ErrorKind, ErrorType, Read, Write};
-use firmware::{byte_queue::ByteQueue, config::RadioConfig, line, second};
+use firmware::{byte_queue::ByteQueue, config::RadioConfig, line::Addresses, second};
 use modbus_server::Adu;
+use modio_drivers::Lora;
 use rtic::Mutex;
 
 use crate::{
-    board::{BOARD, Device},
+    board::{BOARD, Device, Events, Units},
     clock,
 };
 
 /// The second line.
-pub type Second = second::SecondLine<Peer>;
+pub type Second = Line<<Socket as AtSocket>::Peer>;
+
+type Line<P> = second::SecondLine<P, Units>;
 
 /// What is at its UART.
-#[cfg(feature = "slots")]
-type Peer = modio_drivers::Lora<Serial, board_support::IoPin, board_support::IoPin>;
-/// What is at its UART.
-#[cfg(not(feature = "slots"))]
-type Peer = second::Rs232<Serial>;
+pub type Socket = If<{ BOARD.has_radio() }>;
 
 /// Returns the second line, if it is in use. The image of a board without one has no code for what follows.
 #[inline(always)]
@@ -52,39 +51,54 @@ static DAMAGED: AtomicBool = AtomicBool::new(false);
 /// The UART and the queues as a serial port. Only a board with a second line has one.
 pub struct Serial(pub SecondProof);
 
-/// Sets the radio up as the second line of a unit. `config` is `None` while it is off.
-#[cfg(feature = "slots")]
-#[inline(always)]
-pub fn start(
-    off: SecondOff,
-    rcc: &mut pac::RCC,
-    config: Option<RadioConfig>,
-    unit: Option<u8>,
-    power_on: bool,
-    adus: &'static mut [Adu],
-) -> Option<(Second, SecondUart)> {
-    let config = config?;
-    let units = line::units(unit, false)?;
-    let (uart, proof) = off.start(rcc)?;
-    let RadioIo { mode, aux } = RadioIo::start()?;
-    let line = Second::radio(Serial(proof), mode, aux, config, units, power_on, adus);
-    Some((line, uart))
+/// What is needed to start the second line.
+pub struct Start {
+    pub line: SecondOff,
+    /// Settings of the radio; `None` while it is off.
+    pub radio: Option<RadioConfig>,
+    /// The unit address; `None` while the unit has none.
+    pub unit: Option<u8>,
+    /// The start is a power-on.
+    pub power_on: bool,
+    pub adus: &'static mut [Adu],
 }
 
-/// Sets the RS-232 socket up as the second line of a unit. Returns `None` on a board without one.
-#[cfg(not(feature = "slots"))]
-#[inline(always)]
-pub fn start(
-    off: SecondOff,
-    rcc: &mut pac::RCC,
-    _: Option<RadioConfig>,
-    unit: Option<u8>,
-    _: bool,
-    adus: &'static mut [Adu],
-) -> Option<(Second, SecondUart)> {
-    let units = line::units(unit, false)?;
-    let (uart, proof) = off.start(rcc)?;
-    Some((Second::rs232(Serial(proof), units, adus), uart))
+/// A radio, or an RS-232 socket.
+pub trait AtSocket {
+    /// The peer of the line.
+    type Peer: second::Peer;
+
+    /// Sets the second line of a unit up. Returns `None` on a board without one, while a radio is off, and without a unit
+    /// address.
+    fn start(with: Start, rcc: &mut pac::RCC) -> Option<(Line<Self::Peer>, SecondUart)>;
+}
+
+/// A radio.
+impl AtSocket for If<true> {
+    type Peer = Lora<Serial, IoPin, IoPin>;
+
+    #[inline(always)]
+    fn start(with: Start, rcc: &mut pac::RCC) -> Option<(Line<Self::Peer>, SecondUart)> {
+        let config = with.radio?;
+        let units = Events::units(with.unit, false)?;
+        let (uart, proof) = with.line.start(rcc)?;
+        let RadioIo { mode, aux } = RadioIo::start()?;
+        let serial = Serial(proof);
+        let line = Line::radio(serial, mode, aux, config, units, with.power_on, with.adus);
+        Some((line, uart))
+    }
+}
+
+/// An RS-232 socket.
+impl AtSocket for If<false> {
+    type Peer = second::Rs232<Serial>;
+
+    #[inline(always)]
+    fn start(with: Start, rcc: &mut pac::RCC) -> Option<(Line<Self::Peer>, SecondUart)> {
+        let units = Events::units(with.unit, false)?;
+        let (uart, proof) = with.line.start(rcc)?;
+        Some((Line::rs232(Serial(proof), units, with.adus), uart))
+    }
 }
 
 /// Handles the UART's interrupt. This code runs from RAM.

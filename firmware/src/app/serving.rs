@@ -7,9 +7,8 @@
 
 use board_support::device::interrupt;
 use firmware::{
-    HAS_EVENTS, HAS_SLOTS,
     config::{LineName, Origin},
-    line,
+    line::Addresses,
     start_up::RECOVERY_UNIT,
 };
 use modbus_server::{
@@ -21,7 +20,7 @@ use register_map::codes::Command;
 use rtic::Mutex;
 
 use crate::{
-    board::Device,
+    board::{BOARD, Device, Events},
     line::Line,
     second::{Second, in_use},
 };
@@ -144,18 +143,18 @@ impl Serving {
         second: &mut impl Mutex<T = Option<Second>>,
         device: &mut impl Mutex<T = &'static mut Device>,
     ) {
-        if HAS_SLOTS {
+        if BOARD.switch {
             return;
         }
         let fast = self.unit.is_some();
         if let Some(unit) = device.lock(|device| device.take_unit())
-            && let Some(units) = line::units(Some(unit), fast)
+            && let Some(units) = Events::units(Some(unit), fast)
         {
             if let Some(fast) = &mut self.unit {
                 fast.set_address(unit);
             }
             rs485.lock(|line| line.as_mut().map(|line| line.set_units(units)));
-            if let Some(units) = line::units(Some(unit), false) {
+            if let Some(units) = Events::units(Some(unit), false) {
                 second.lock(|line| in_use(line).map(|line| line.set_units(units)));
             }
         }
@@ -180,7 +179,7 @@ impl Served {
             by_serial: false,
         };
         let ended = request.ended();
-        let mut unit = unit.filter(|_| HAS_EVENTS && request.unit() == fast::ADDRESS);
+        let mut unit = unit.filter(|_| BOARD.events && request.unit() == fast::ADDRESS);
         if let Some(unit) = unit.as_mut()
             && !unit.open(&mut request)
         {

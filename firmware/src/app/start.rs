@@ -8,12 +8,11 @@ use board_support::{
 };
 use cortex_m::peripheral::SCB;
 use firmware::{
-    HAS_EVENTS, KEEPS_OUTPUTS,
     config::{self, Config, LineConfig, RadioConfig},
     device::Identity,
     kept_outputs::KeptOutputs,
     leds::{Leds, Trouble},
-    line,
+    line::Addresses,
     start_up::{self, Address, RECOVERY_UNIT},
     store::{Store, WriteError},
 };
@@ -26,21 +25,20 @@ use ports::uart;
 use register_map::{
     codes::{Format, GapRule, Mode},
     configuration::UNIT,
-    links,
     state::{build as build_bits, reset_cause::POWER_ON},
     update::{DEVELOPMENT_KEY, Header},
 };
 
 use crate::{
     background::Background,
-    board::{BOARD, DESCRIPTION, Device},
+    board::{BOARD, Device, Events},
     fault_record,
     installed::install,
     line::Line,
     log::{self, Log},
     persistence::Persistence,
     scanning::Scanning,
-    second::{self, Second},
+    second::{self, AtSocket, Second, Socket},
     serving::Serving,
     updating::Updating,
 };
@@ -85,7 +83,7 @@ pub fn up(
     let mut board = board::setup(device, scb, masked);
     let mut pages = board.flash;
     let mut store = Store::open(&pages);
-    let loaded = store.load(BOARD, &pages);
+    let loaded = store.load(&pages);
     let number = if board.as_255 {
         RECOVERY_UNIT
     } else if BOARD.switch || board.dip == RECOVERY_UNIT {
@@ -96,26 +94,22 @@ pub fn up(
     let address = Address::from_dip(number, SLOT.is_some());
     let settings = start_up::line(address, LineConfig::of(&loaded.settings));
     let radio_config = RadioConfig::of(&loaded.settings);
-    let mut config = Config::new(
-        BOARD,
-        loaded.settings,
-        loaded.invalid || loaded.rejected > 0,
-    );
+    let mut config = Config::new(loaded.settings, loaded.invalid || loaded.rejected > 0);
     config.set_saves_left(board.saves_left);
     let points_only = config.air_serves_points_only();
     // A radio does not serve recovery, whose address is the same for all units.
     let radio_config = radio_config.filter(|_| matches!(address, Address::Unit(_)));
-    let installed = *config.modules();
     let on_wire = wire_settings(settings);
 
     let mut sampler = board.sampler;
-    let (modules, analog_outputs) = install(installed, &mut sampler, board.dacs, board.own_dac);
-    let serial_number = if HAS_EVENTS {
+    let (modules, analog_outputs) =
+        install(config.modules(), &mut sampler, board.dacs, board.own_dac);
+    let serial_number = if BOARD.events {
         start_up::serial_number(board.unique_id, config.serial_low())
     } else {
         0
     };
-    let is_fast = settings.mode == Mode::Rtu && HAS_EVENTS;
+    let is_fast = settings.mode == Mode::Rtu && BOARD.events;
     let identity = Identity {
         serial_number,
         reports_events: is_fast && matches!(address, Address::Unit(_)),
@@ -126,8 +120,8 @@ pub fn up(
         internal_oscillator: !board.clock.is_crystal(),
         build: build(board.development),
     };
-    let device = Device::new_in(place, config, identity, DESCRIPTION);
-    let kept = if links::exist(SLOTS) {
+    let device = Device::new_in(place, config, identity);
+    let kept = if BOARD.has_links() {
         kept::outputs()
     } else {
         None
@@ -138,7 +132,7 @@ pub fn up(
         held,
         at_safe,
     });
-    let stored = if KEEPS_OUTPUTS {
+    let stored = if BOARD.keeps_outputs {
         store.outputs(&pages)
     } else {
         None
@@ -156,7 +150,7 @@ pub fn up(
         address,
         dip: board.dip,
         line: settings,
-        modules: installed,
+        modules: device.config.modules(),
         clock: board.clock,
         reset_cause: board.reset_cause,
         faults: board.faults,
@@ -180,7 +174,7 @@ pub fn up(
     let t35 = settings
         .frame_gap
         .map_or(gaps.t35, |tenths| gaps.frame_gap(tenths));
-    let line = line::units(address.unit(), is_fast).and_then(|units| {
+    let line = Events::units(address.unit(), is_fast).and_then(|units| {
         let strict = settings.gap_rule == GapRule::Drop;
         let (receiver, (t15_ns, t35_ns)) = match framing {
             Framing::Rtu => (Receiver::rtu(units, strict), (gaps.t15.min(t35), t35)),
@@ -204,7 +198,11 @@ pub fn up(
         let longest_ms = (limit_us / 1000) as u16 + 2;
         let port = Port::new(receiver, adus);
         // Without function 70 nothing needs these times.
-        let (bit, us) = if HAS_EVENTS { gap.bit_and_us() } else { (0, 0) };
+        let (bit, us) = if BOARD.events {
+            gap.bit_and_us()
+        } else {
+            (0, 0)
+        };
         Some(Line::new(
             uart,
             gap,
@@ -214,15 +212,14 @@ pub fn up(
         ))
     });
 
-    let (second, second_uart) = second::start(
-        board.second,
-        &mut board.rcc,
-        radio_config,
-        address.unit(),
-        u16::from(board.reset_cause) & POWER_ON != 0,
-        second_adus,
-    )
-    .unzip();
+    let second = second::Start {
+        line: board.second,
+        radio: radio_config,
+        unit: address.unit(),
+        power_on: u16::from(board.reset_cause) & POWER_ON != 0,
+        adus: second_adus,
+    };
+    let (second, second_uart) = Socket::start(second, &mut board.rcc).unzip();
 
     Started {
         line,
@@ -230,7 +227,7 @@ pub fn up(
         second_uart,
         serving: Serving::new(
             identity.unit,
-            HAS_EVENTS.then(|| {
+            BOARD.events.then(|| {
                 let part = start_up::part(address, board.clock.is_crystal());
                 fast::Unit::new(serial_number, identity.unit, part)
             }),

@@ -1,11 +1,12 @@
 //! The settings in force, as typed values for the rest of the device.
 
 use modio_drivers::{ChannelSettings, LoraSettings, Scale, Signal};
+use register_map::board::Board;
 use register_map::codes::{Format, GapRule, Mode};
 use register_map::configuration as at;
+use register_map::deadband::DEADBAND;
 
 use super::Settings;
-use crate::KEEPS_OUTPUTS;
 
 /// Settings of the RS-485 line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,7 +35,7 @@ impl LineConfig {
 
     /// Returns the settings of the line that a start with these settings puts in force.
     #[must_use]
-    pub fn of<const SLOTS: usize>(settings: &Settings<SLOTS>) -> Self {
+    pub fn of<B: Board>(settings: &Settings<B>) -> Self {
         let get = |address| settings.get(address);
         Self {
             baud: u32::from(get(at::BAUD)) * 100,
@@ -59,7 +60,7 @@ impl RadioConfig {
     /// Returns the settings of the radio line that a start with these settings puts in force, or `None` when the
     /// radio is off.
     #[must_use]
-    pub fn of<const SLOTS: usize>(settings: &Settings<SLOTS>) -> Option<Self> {
+    pub fn of<B: Board>(settings: &Settings<B>) -> Option<Self> {
         let get = |address| settings.get(address);
         // The values are in the ranges of the register map, which fit a byte.
         let byte = |address| get(address).to_le_bytes()[0];
@@ -85,7 +86,6 @@ pub struct Point {
     /// output.
     pub safe: Option<u16>,
     /// Change of an analog input that is an event, in its unit; 0 for 1/256 of its range.
-    #[cfg(not(feature = "small"))]
     pub deadband: u16,
     /// Output at power-on: 0 or 1 for a bit, 0 to 4095 raw for a word. 0 for an output that is to start as it was, until
     /// its value is restored.
@@ -94,7 +94,7 @@ pub struct Point {
 
 impl Point {
     /// Returns the settings of a point, 0 to 31.
-    pub(super) fn of<const SLOTS: usize>(settings: &Settings<SLOTS>, point: u16) -> Self {
+    pub(super) fn of<B: Board>(settings: &Settings<B>, point: u16) -> Self {
         let get = |first: u16| settings.get(first.wrapping_add(point));
         Self {
             settings: ChannelSettings {
@@ -104,10 +104,9 @@ impl Point {
                 scale: Scale::from_code(get(at::SCALE)).unwrap_or_default(),
             },
             safe: Some(get(at::SAFE)).filter(|safe| *safe != at::HOLD),
-            #[cfg(not(feature = "small"))]
-            deadband: get(register_map::deadband::DEADBAND),
+            deadband: if B::ROW.events { get(DEADBAND) } else { 0 },
             start: match get(at::START) {
-                at::AS_IT_WAS if KEEPS_OUTPUTS => 0,
+                at::AS_IT_WAS if B::ROW.keeps_outputs => 0,
                 start => start,
             },
         }

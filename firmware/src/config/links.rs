@@ -1,24 +1,20 @@
-//! The registers of the links, 0x0400 to 0x04FF: for the digital outputs of the modules chosen last.
+//! The values of the registers of the links, 0x0400 to 0x04FF.
 
-use modbus_server::{Exception, Span, Words};
-use register_map::links::{self, WORDS, point_of};
-use register_map::points::{CHANNELS, Kind};
+use register_map::board::{Board, Each};
+use register_map::links::{self, point_of};
+use register_map::points::CHANNELS;
 
-use super::Config;
-use super::settings::{Settings, differences};
 use crate::links::{Link, OF_A_SLOT};
 
-/// The links of the points of a board with `SLOTS` slots.
+/// The links of the points of a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Links<const SLOTS: usize> {
-    /// The board's first point.
-    first: u16,
-    slots: [[Link; OF_A_SLOT]; SLOTS],
+pub(super) struct Links<B: Board> {
+    slots: Each<B::Ports, [Link; OF_A_SLOT]>,
 }
 
-impl<const SLOTS: usize> Links<SLOTS> {
+impl<B: Board> Links<B> {
     /// The board has links. A constant, so that nothing of them is in the image of a board without.
-    pub const EXIST: bool = links::exist(SLOTS);
+    pub const EXIST: bool = B::ROW.has_links();
 
     /// Returns whether an address is one of a link.
     pub const fn contain(address: u16) -> bool {
@@ -26,16 +22,15 @@ impl<const SLOTS: usize> Links<SLOTS> {
     }
 
     /// Returns links that do nothing.
-    pub const fn new(first: u16) -> Self {
+    pub fn new() -> Self {
         Self {
-            first,
-            slots: [[Link::NONE; OF_A_SLOT]; SLOTS],
+            slots: Each::all([Link::NONE; OF_A_SLOT]),
         }
     }
 
-    /// Returns the slot of a point. It is not below `SLOTS` for a point that the board does not have.
-    pub fn slot_of(&self, point: u16) -> usize {
-        usize::from(point.wrapping_sub(self.first) / CHANNELS)
+    /// Returns the slot of a point. It is not below the number of slots for a point that the board does not have.
+    pub fn slot_of(point: u16) -> usize {
+        usize::from(point.wrapping_sub(B::ROW.points().start) / CHANNELS)
     }
 
     /// Returns a link of a slot.
@@ -45,17 +40,17 @@ impl<const SLOTS: usize> Links<SLOTS> {
     }
 
     /// Returns a link of a slot, to be changed.
-    fn link_mut(&mut self, (slot, index): (usize, usize)) -> Option<&mut Link> {
+    pub fn link_mut(&mut self, (slot, index): (usize, usize)) -> Option<&mut Link> {
         self.slots.get_mut(slot)?.get_mut(index)
     }
 
     /// Returns slot and number of the link of a register, if the board has it.
     #[inline(never)]
-    pub fn place(&self, address: u16) -> Option<(usize, usize)> {
-        let slot = self.slot_of(point_of(address));
+    pub fn place(address: u16) -> Option<(usize, usize)> {
+        let slot = Self::slot_of(point_of(address));
         // The first links of the points, then the second ones.
         let index = (address >> 7 & 1) * CHANNELS + point_of(address) % CHANNELS;
-        (links::contain(address) && slot < SLOTS).then_some((slot, usize::from(index)))
+        (links::contain(address) && slot < B::PORTS).then_some((slot, usize::from(index)))
     }
 
     /// Returns the link of a register, if the board has it.
@@ -63,13 +58,13 @@ impl<const SLOTS: usize> Links<SLOTS> {
         if !Self::EXIST {
             return None;
         }
-        let (slot, index) = self.place(address)?;
+        let (slot, index) = Self::place(address)?;
         Some(self.link(slot, index))
     }
 
     /// Sets a register, if the board has it.
     pub fn set(&mut self, address: u16, value: u16) {
-        if let Some(place) = self.place(address)
+        if let Some(place) = Self::place(address)
             && let Some(link) = self.link_mut(place)
         {
             *link.word_mut(address) = value;
@@ -93,106 +88,7 @@ impl<const SLOTS: usize> Links<SLOTS> {
     }
 }
 
-impl<const SLOTS: usize> Settings<SLOTS> {
-    /// Returns whether the chosen module has a digital output at the point of a register of the links.
-    pub(super) fn has_link(&self, address: u16) -> bool {
-        Links::<SLOTS>::contain(address) && self.kind(point_of(address)) == Kind::BitOutput
-    }
-
-    /// Returns whether the chosen modules allow a link.
-    fn allows(&self, link: &Link) -> bool {
-        link.suits(link.source().map_or(Kind::None, |source| self.kind(source)))
-    }
-
-    /// Sets to the default the links that the chosen modules do not allow, and those from or to a slot whose module has
-    /// changed. Returns their number.
-    pub(super) fn drop_links(&mut self, changed: Option<usize>) -> u16 {
-        let mut dropped: u16 = 0;
-        if !Links::<SLOTS>::EXIST {
-            return dropped;
-        }
-        for slot in 0..SLOTS {
-            for index in 0..OF_A_SLOT {
-                let link = self.links.link(slot, index);
-                let from = link.source().map(|source| self.links.slot_of(source));
-                let to = Some(slot);
-                if changed.is_some() && (changed == from || changed == to) || !self.allows(link) {
-                    if let Some(link) = self.links.link_mut((slot, index)) {
-                        *link = Link::NONE;
-                    }
-                    dropped = dropped.saturating_add(1);
-                }
-            }
-        }
-        dropped
-    }
-}
-
-impl<const SLOTS: usize> Config<SLOTS> {
-    /// Checks whether registers of links exist.
-    ///
-    /// # Errors
-    ///
-    /// Exception 02 when one does not belong to a digital output.
-    pub(super) fn check_links(&self, span: Span) -> Result<(), Exception> {
-        let addresses = u32::from(span.start())..span.end();
-        if addresses
-            .map(|address| address as u16)
-            .all(|address| self.edited.has_link(address))
-        {
-            Ok(())
-        } else {
-            Err(Exception::IllegalDataAddress)
-        }
-    }
-
-    /// Returns whether every link is consistent once these values are written.
-    pub(super) fn suits_the_links(&self, span: Span, words: Words<'_>) -> bool {
-        // The first register of each link that is written.
-        let first = |address: &u16| *address == span.start() || address.is_multiple_of(WORDS);
-        span.addresses().filter(first).all(|address| {
-            let Some(mut link) = self.edited.links.at(address).copied() else {
-                return false;
-            };
-            for (word, address) in link.0.iter_mut().zip(address / WORDS * WORDS..) {
-                if let Some(written) = words.get(address.wrapping_sub(span.start())) {
-                    *word = written;
-                }
-            }
-            self.edited.allows(&link)
-        })
-    }
-
-    /// Notes which links a write has written, also with the values that they had.
-    pub(super) fn note_links(&mut self, span: Span) {
-        if !Links::<SLOTS>::contain(span.start()) {
-            return;
-        }
-        for address in span.addresses() {
-            if let Some((slot, index)) = self.edited.links.place(address)
-                && let Some(links) = self.written_links.get_mut(slot)
-            {
-                *links |= 1 << index;
-            }
-        }
-    }
-
-    /// Returns the links of a slot that were written since the last call, a bit for each. COMMAND 3 and 4 write all links.
-    pub fn take_written_links(&mut self, slot: usize) -> u8 {
-        self.written_links.get_mut(slot).map_or(0, core::mem::take)
-    }
-
-    /// Returns a link that is in force: until the restart one from or to a port whose MODULE has changed is not.
-    #[must_use]
-    pub fn link(&self, slot: usize, index: usize) -> &Link {
-        let link = self.edited.links.link(slot, index);
-        let from = link
-            .source()
-            .map_or(slot, |source| self.edited.links.slot_of(source));
-        if self.is_in_force(slot) && self.is_in_force(from) {
-            link
-        } else {
-            const { &Link::NONE }
-        }
-    }
+/// Returns the number of words that differ.
+pub(super) fn differences(a: &[u16], b: &[u16]) -> u16 {
+    a.iter().zip(b).map(|(a, b)| u16::from(a != b)).sum()
 }

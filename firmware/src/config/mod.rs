@@ -18,6 +18,7 @@
 //! opened, a broadcast over the air writes nothing here, and the radio may be set to write nothing here at all.
 
 mod in_force;
+mod linked;
 mod links;
 mod lock;
 mod origin;
@@ -26,30 +27,27 @@ mod settings;
 #[cfg(test)]
 mod tests;
 
-use core::array;
-
 use modbus_server::{Exception, Span, Words, WordsOut};
+use modio_drivers::{CHANNELS, Kind};
+use register_map::board::{Board, Each};
 use register_map::codes::{CommSource, Command, Lora};
 use register_map::configuration::{
     AS_IT_WAS, COMM_SOURCE, COMM_TIMEOUT, COMMAND, FILTER, FORMAT, HEARTBEAT, KEY, LORA,
-    LORA_FRAME_GAP, MODE, MODULE, RANGE, RESPONSE_DELAY, RULES, SAVE_EVERY_S, SAVES, SERIAL_LOW,
-    START, UNIT,
+    LORA_FRAME_GAP, MODE, MODULE, RANGE, RESPONSE_DELAY, SAVE_EVERY_S, SAVES, SERIAL_LOW, START,
+    UNIT,
 };
 use register_map::state::status;
-use register_map::{Board, Module, Run, Runs, links as links_map, runs};
+use register_map::{Module, Run, Runs, links as links_map, runs};
 use register_map::{deadband, points};
 
-use crate::HAS_SLOTS;
 use crate::budget::Budget;
 pub use in_force::{LineConfig, Point, RadioConfig};
 use links::Links;
 use lock::Lock;
 pub use origin::{LineName, Origin};
 pub use settings::RestartValues;
-use settings::{
-    RESTARTS, format_suits_mode, has_deadband, is_setting, port_of, restart_addresses, takes_module,
-};
-pub use settings::{Settings, kinds};
+pub use settings::Settings;
+use settings::{RESTARTS, format_suits_mode, has_deadband, is_setting, port_of, restart_addresses};
 
 /// How far a save is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,6 +63,11 @@ enum Save {
 /// A write that does nothing. It needs no lock, and every line may make it.
 const HEARTBEAT_ALONE: Span = Span::single(HEARTBEAT);
 
+/// Returns the number of a port, given its index.
+fn port_at<B: Board>(index: usize) -> u16 {
+    B::ROW.first_port.wrapping_add(index as u16)
+}
+
 /// Checks whether registers of DEADBAND exist. The first one does.
 ///
 /// # Errors
@@ -79,13 +82,12 @@ fn check_deadbands(span: Span) -> Result<(), Exception> {
     }
 }
 
-/// The configuration of a running device on a board with `SLOTS` slots.
+/// The configuration of a running device.
 #[derive(Debug)]
-pub struct Config<const SLOTS: usize> {
-    board: &'static Board,
-    edited: Settings<SLOTS>,
+pub struct Config<B: Board> {
+    edited: Settings<B>,
     /// The stored settings, or those being stored.
-    saved: Settings<SLOTS>,
+    saved: Settings<B>,
     /// Number of settings in `edited` that differ from `saved`.
     differences: u16,
     save: Save,
@@ -98,7 +100,7 @@ pub struct Config<const SLOTS: usize> {
     /// The radio serves points and reads only.
     points_only: bool,
     /// The modules in force, by slot.
-    modules: [Module; SLOTS],
+    modules: Each<B::Ports, Module>,
     /// The settings that need a restart, with their values at the start.
     started: [u16; RESTARTS],
     /// The stored configuration was damaged or contained rejected values at the start.
@@ -109,26 +111,23 @@ pub struct Config<const SLOTS: usize> {
     /// Bit 0 is the board's first port.
     left: u8,
     /// Links of each slot that were written and are to begin again, a bit for each.
-    written_links: [u8; SLOTS],
+    written_links: Each<B::Ports, u8>,
     revision: u16,
 }
 
-impl<const SLOTS: usize> Config<SLOTS> {
-    /// Creates the configuration at the start, on a board with `SLOTS` slots. `invalid` says that the stored
-    /// settings were damaged, or that some were rejected, and defaults are used instead.
+impl<B: Board> Config<B> {
+    /// Creates the configuration at the start. `invalid` says that the stored settings were damaged,
+    /// or that some were rejected, and defaults are used instead.
     #[must_use]
     #[inline(never)]
-    pub fn new(board: &'static Board, stored: Settings<SLOTS>, invalid: bool) -> Self {
+    pub fn new(stored: Settings<B>, invalid: bool) -> Self {
         let mut started = [0; RESTARTS];
         for (place, value) in started.iter_mut().zip(stored.restart_values()) {
             *place = value;
         }
         let points_only = stored.get(LORA) == Lora::PointsOnly.code();
         Self {
-            board,
-            modules: array::from_fn(|slot| {
-                stored.module(board.first_port.wrapping_add(slot as u16))
-            }),
+            modules: Each::of(|slot| stored.module(port_at::<B>(slot))),
             edited: stored,
             saved: stored,
             differences: 0,
@@ -142,7 +141,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
             invalid,
             waiting: false,
             left: 0,
-            written_links: [0; SLOTS],
+            written_links: Each::all(0),
             revision: 0,
         }
     }
@@ -186,7 +185,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
     /// Returns whether the request that is being served came over the air.
     #[must_use]
     pub fn is_over_the_air(&self) -> bool {
-        self.origin.line == LineName::Second && self.has_radio()
+        self.origin.line == LineName::Second && B::ROW.has_radio()
     }
 
     /// Keeps the lock open for as long as after a write, if it is open for the request.
@@ -207,9 +206,9 @@ impl<const SLOTS: usize> Config<SLOTS> {
     ///
     /// Exception 02 when the span contains a gap, or a register that the board does not have.
     pub fn check_read(&self, span: Span) -> Result<(), Exception> {
-        match runs(RULES, span.start(), span.count()) {
-            _ if Links::<SLOTS>::contain(span.start()) => self.check_links(span),
-            _ if has_deadband(span.start()) => check_deadbands(span),
+        match runs(B::ROW.rules(), span.start(), span.count()) {
+            _ if Links::<B>::contain(span.start()) => self.check_links(span),
+            _ if has_deadband::<B>(span.start()) => check_deadbands(span),
             Some(_) if self.has(span) => Ok(()),
             _ => Err(Exception::IllegalDataAddress),
         }
@@ -218,24 +217,19 @@ impl<const SLOTS: usize> Config<SLOTS> {
     /// Returns whether the board has these registers, which are not in a gap.
     fn has(&self, span: Span) -> bool {
         let has = |first: u16, last: u16| u32::from(first) < span.end() && span.start() <= last;
-        let lacks_unit = HAS_SLOTS || self.board.switch;
-        !(lacks_unit && has(UNIT, UNIT)) && (self.has_radio() || !has(LORA, LORA_FRAME_GAP))
-    }
-
-    /// Returns whether the second line is a radio.
-    const fn has_radio(&self) -> bool {
-        HAS_SLOTS || self.board.has_radio()
+        let lacks_unit = B::ROW.switch;
+        !(lacks_unit && has(UNIT, UNIT)) && (B::ROW.has_radio() || !has(LORA, LORA_FRAME_GAP))
     }
 
     /// Returns whether the board has these registers, and lets them be written.
     fn lets_write(&self, span: Span) -> bool {
-        let fixed = |address| port_of(address).is_some_and(|port| !self.board.chooses(port));
-        self.has(span) && (HAS_SLOTS || !span.addresses().any(fixed))
+        let fixed = |address| port_of(address).is_some_and(|port| !B::ROW.chooses(port));
+        self.has(span) && (B::ROW.is_modular() || !span.addresses().any(fixed))
     }
 
     /// Appends every register of a span that [`Self::check_read`] has accepted.
     pub fn read(&self, span: Span, out: &mut WordsOut<'_>) {
-        if Links::<SLOTS>::contain(span.start()) {
+        if Links::<B>::contain(span.start()) {
             let addresses = span.addresses();
             return addresses.for_each(|address| out.push(self.edited.get(address)));
         }
@@ -265,14 +259,14 @@ impl<const SLOTS: usize> Config<SLOTS> {
         if span == HEARTBEAT_ALONE {
             return Ok(());
         }
-        let suits = if Links::<SLOTS>::contain(span.start()) {
+        let suits = if Links::<B>::contain(span.start()) {
             self.check_links(span)?;
             self.suits_the_links(span, words)
-        } else if has_deadband(span.start()) {
+        } else if has_deadband::<B>(span.start()) {
             check_deadbands(span)?;
             true
         } else {
-            let runs = runs(RULES, span.start(), span.count());
+            let runs = runs(B::ROW.rules(), span.start(), span.count());
             let runs = runs.filter(|_| self.lets_write(span));
             let runs = runs.ok_or(Exception::IllegalDataAddress)?;
             self.suit(runs, words) && self.suits_the_mode(span, words)
@@ -326,9 +320,9 @@ impl<const SLOTS: usize> Config<SLOTS> {
         if run.rule.first == MODULE {
             return (run.index..)
                 .zip(words.iter())
-                .all(|(index, code)| takes_module(self.board, index.wrapping_add(1), code));
+                .all(|(index, code)| B::ROW.takes(index.wrapping_add(1), code));
         }
-        if !HAS_SLOTS && run.rule.first == RANGE {
+        if !B::ROW.is_modular() && run.rule.first == RANGE {
             let addresses = RANGE.wrapping_add(run.index)..;
             let mut ranges = addresses.zip(words.iter());
             if !ranges.all(|(address, range)| self.edited.takes_range(address, range)) {
@@ -339,12 +333,12 @@ impl<const SLOTS: usize> Config<SLOTS> {
             return true;
         };
         // Ports without a slot have no module that could restrict their points.
-        self.board.ports().all(|port| {
+        B::ROW.ports().all(|port| {
             let first = points::of_port(port);
             if first >= run.index.wrapping_add(run.count) {
                 return true;
             }
-            let kinds = kinds(self.board, port, self.edited.module(port));
+            let kinds = B::ROW.kinds(port, self.edited.module(port));
             (first..).zip(kinds).all(|(point, kind)| {
                 kind != narrower.kind
                     || words
@@ -380,7 +374,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
         }
         self.lock.open(self.origin.line);
         let mut command = None;
-        if (FILTER..links_map::LINKS).contains(&span.start()) || has_deadband(span.start()) {
+        if (FILTER..links_map::LINKS).contains(&span.start()) || has_deadband::<B>(span.start()) {
             // These registers do not affect others.
             let edited = self.edited.slice_mut(span.start(), span.count());
             for (edited, value) in edited.iter_mut().zip(words.iter()) {
@@ -412,7 +406,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
     /// Exception 02 on a board with a switch, and in a request to the unit address; 03 for a value that is not a unit
     /// address; 06 while a save is under way, or when nothing is left of the budget.
     pub fn check_unit(&self, unit: Option<u16>) -> Result<(), Exception> {
-        if HAS_SLOTS || self.board.switch || !self.origin.by_serial {
+        if B::ROW.switch || !self.origin.by_serial {
             return Err(Exception::IllegalDataAddress);
         }
         match unit {
@@ -433,7 +427,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
             self.saved.set(UNIT, unit);
             self.save = Save::Begun;
         }
-        for (started, address) in self.started.iter_mut().zip(restart_addresses()) {
+        for (started, address) in self.started.iter_mut().zip(restart_addresses::<B>()) {
             if address == UNIT {
                 *started = unit;
             }
@@ -448,8 +442,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
     pub fn compare(&mut self) {
         self.differences = self.edited.differences(&self.saved);
         for (index, module) in self.modules.iter().enumerate() {
-            let port = self.board.first_port.wrapping_add(index as u16);
-            if self.edited.module(port) != *module {
+            if self.edited.module(port_at::<B>(index)) != *module {
                 self.left |= 1 << (index & 7);
             }
         }
@@ -457,15 +450,15 @@ impl<const SLOTS: usize> Config<SLOTS> {
 
     /// COMMAND 3: sets every setting to its default. These values are not stored in flash.
     pub fn load_defaults(&mut self) {
-        self.edited = Settings::defaults(self.board);
-        self.written_links = [u8::MAX; SLOTS];
+        self.edited = Settings::defaults();
+        self.written_links = Each::all(u8::MAX);
         self.revision = self.revision.wrapping_add(1);
     }
 
     /// COMMAND 4: sets every setting to its saved value.
     pub fn drop_changes(&mut self) {
         self.edited = self.saved;
-        self.written_links = [u8::MAX; SLOTS];
+        self.written_links = Each::all(u8::MAX);
         self.left = 0;
         self.revision = self.revision.wrapping_add(1);
     }
@@ -480,7 +473,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
 
     /// Returns the settings that [`Self::begin_save`] copied.
     #[must_use]
-    pub const fn to_save(&self) -> &Settings<SLOTS> {
+    pub const fn to_save(&self) -> &Settings<B> {
         &self.saved
     }
 
@@ -499,7 +492,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
     }
 
     /// Ends a save that failed. `stored` is what the flash still holds.
-    pub fn save_failed(&mut self, stored: Settings<SLOTS>) {
+    pub fn save_failed(&mut self, stored: Settings<B>) {
         self.saved = stored;
         self.differences = self.edited.differences(&self.saved);
         self.save = Save::None;
@@ -573,16 +566,17 @@ impl<const SLOTS: usize> Config<SLOTS> {
         self.revision
     }
 
-    /// Returns the board.
-    #[must_use]
-    pub const fn board(&self) -> &'static Board {
-        self.board
-    }
-
     /// Returns the modules in force, for every port with a slot, in the order of the ports.
     #[must_use]
-    pub const fn modules(&self) -> &[Module; SLOTS] {
+    pub fn modules(&self) -> &[Module] {
         &self.modules
+    }
+
+    /// Returns the kinds of the points of a port with its module in force. `index` counts the ports with a slot.
+    #[must_use]
+    pub fn kinds(&self, index: usize) -> [Kind; CHANNELS] {
+        let module = self.modules.get(index).copied().unwrap_or(Module::None);
+        B::ROW.kinds(port_at::<B>(index), module)
     }
 
     /// Returns whether MODULE of a port has not been changed since the start. `index` counts the ports with a slot.
@@ -595,7 +589,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
     /// point to the new module's defaults, so the running module keeps the settings that were returned last.
     #[must_use]
     pub fn point(&self, index: usize, channel: usize) -> Option<Point> {
-        let first = points::of_port(self.board.first_port.wrapping_add(index as u16));
+        let first = points::of_port(port_at::<B>(index));
         self.is_in_force(index)
             .then(|| Point::of(&self.edited, first.wrapping_add(channel as u16)))
     }
@@ -604,7 +598,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
     /// with a slot.
     #[must_use]
     pub fn starts_as_it_was(&self, index: usize, channel: usize) -> bool {
-        let port = self.board.first_port.wrapping_add(index as u16);
+        let port = port_at::<B>(index);
         let point = points::of_port(port).wrapping_add(channel as u16);
         self.modules.get(index) == Some(&self.saved.module(port))
             && self.saved.get(START.wrapping_add(point)) == AS_IT_WAS

@@ -1,27 +1,24 @@
 //! The value of every setting.
 
+use core::ops::Range;
+
 use modio_drivers::CHANNELS;
+use register_map::board::{Board, Each};
 use register_map::codes::{Format, Mode};
 use register_map::configuration::{
     self, COMMAND, FORMAT, HEARTBEAT, KEY, MODE, MODULE, RANGE, RULES, module_of,
 };
 use register_map::deadband::{self, DEADBAND};
 use register_map::points::{self, Kind};
-use register_map::{Board, InForce, Module, Rule, links, rule_at};
+use register_map::{InForce, Module, Rule, links, rule_at};
 
-use super::links::Links;
-use crate::{HAS_EVENTS, HAS_SLOTS};
+use super::links::{Links, differences};
+use crate::links::{Link, OF_A_SLOT};
 
 /// High byte of every configuration address. The low byte is the index in [`Settings`].
 const PAGE: u16 = KEY >> 8;
-/// Index of the first DEADBAND, behind the values of the configuration.
-const DEADBANDS: usize = 256;
-/// Number of values in [`Settings`].
-const VALUES: usize = if HAS_EVENTS {
-    DEADBANDS + points::COUNT as usize
-} else {
-    DEADBANDS
-};
+/// Number of addresses of the configuration.
+const VALUES: usize = 256;
 
 /// Number of settings that need a restart.
 pub(super) const RESTARTS: usize = restarts();
@@ -30,33 +27,33 @@ pub(super) const RESTARTS: usize = restarts();
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RestartValues(pub(super) [u16; RESTARTS]);
 
-/// A value for every register of the configuration, and the links of the points in `SLOTS` slots. The values are
+/// A value for every register of the configuration, the links and DEADBAND. The values are
 /// consistent: a setting by point is always one that the point's module allows, and so is a link.
 // `Copy`, because copies of its parts one after another take more flash. Aligned, so that it is copied by words: requests
 // wait for the copy.
 #[repr(align(4))]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Settings<const SLOTS: usize> {
-    /// See [`place`]. KEY, COMMAND, HEARTBEAT and gaps hold 0.
+pub struct Settings<B: Board> {
+    /// By the low byte of the address. KEY, COMMAND, HEARTBEAT and gaps hold 0.
     values: [u16; VALUES],
-    board: &'static Board,
-    pub(super) links: Links<SLOTS>,
+    deadbands: Each<B::Events, [u16; points::COUNT as usize]>,
+    pub(super) links: Links<B>,
 }
 
-impl<const SLOTS: usize> Settings<SLOTS> {
-    /// Returns the factory settings of a board.
+impl<B: Board> Settings<B> {
+    /// Returns the factory settings.
     #[must_use]
-    pub fn defaults(board: &'static Board) -> Self {
+    pub fn defaults() -> Self {
         let mut settings = Self {
             values: [0; VALUES],
-            board,
-            links: Links::new(board.points().start),
+            deadbands: Each::all([0; points::COUNT as usize]),
+            links: Links::new(),
         };
-        for (rule, address) in Addresses::from(KEY) {
+        for (rule, address) in Addresses::from::<B>(KEY) {
             settings.put(address, rule.default);
         }
-        if !HAS_SLOTS {
-            for (port, fixed) in board.ports().zip(board.fixed) {
+        if !B::ROW.is_modular() {
+            for (port, fixed) in B::ROW.ports().zip(B::ROW.fixed) {
                 settings.put(module_of(port), fixed.module.code());
                 settings.set_ranges(port);
             }
@@ -67,22 +64,22 @@ impl<const SLOTS: usize> Settings<SLOTS> {
     /// Returns the settings from a record's pairs of address and value, in ascending order, and the number of values that
     /// this board does not allow and that have their default instead. Unknown addresses are ignored.
     #[must_use]
-    pub fn load(board: &'static Board, pairs: impl Iterator<Item = (u16, u16)>) -> (Self, u16) {
-        let mut settings = Self::defaults(board);
+    pub fn load(pairs: impl Iterator<Item = (u16, u16)>) -> (Self, u16) {
+        let mut settings = Self::defaults();
         let mut rejected: u16 = 0;
         // Pairs are in ascending order. So the modules, which determine which settings by point are allowed, come before
         // these.
         for (address, value) in pairs {
-            let rule = rule_at(RULES, address).filter(|(rule, _)| holds(rule));
+            let rule = rule_at(B::ROW.rules(), address).filter(|(rule, _)| holds(rule));
             let allowed = match rule {
                 Some((rule, _)) => {
                     let port = port_of(address);
                     rule.values_for(settings.kind_at(address)).allow(value)
-                        && port.is_none_or(|port| takes_module(board, port, value))
+                        && port.is_none_or(|port| B::ROW.takes(port, value))
                         && settings.takes_range(address, value)
                 }
-                None if Links::<SLOTS>::contain(address) => settings.has_link(address),
-                None if has_deadband(address) => true,
+                None if Links::<B>::contain(address) => settings.has_link(address),
+                None if has_deadband::<B>(address) => true,
                 None => continue,
             };
             if allowed {
@@ -104,8 +101,8 @@ impl<const SLOTS: usize> Settings<SLOTS> {
     #[inline(never)]
     #[must_use]
     pub fn get(&self, address: u16) -> u16 {
-        match self.values.get(place(address)) {
-            Some(value) if is_held(address) => *value,
+        match self.slice(address, 1) {
+            [value] if is_held::<B>(address) => *value,
             _ => self.links.at(address).map_or(0, |link| link.word(address)),
         }
     }
@@ -130,22 +127,22 @@ impl<const SLOTS: usize> Settings<SLOTS> {
             return Kind::None;
         }
         let port = point / points::CHANNELS + 1;
-        let kinds = kinds(self.board, port, self.module(port));
+        let kinds = B::ROW.kinds(port, self.module(port));
         let channel = usize::from(point % points::CHANNELS);
         kinds.get(channel).copied().unwrap_or(Kind::None)
     }
 
     /// Returns every setting from this address on that differs from its default, in ascending order.
     #[must_use]
-    pub fn changed_from(&self, first: u16) -> Changed<'_, SLOTS> {
-        let behind = if Links::<SLOTS>::EXIST {
+    pub fn changed_from(&self, first: u16) -> Changed<'_, B> {
+        let behind = if Links::<B>::EXIST {
             links::LINKS
         } else {
             DEADBAND
         };
         Changed {
             settings: self,
-            held: Addresses::from(first),
+            held: Addresses::from::<B>(first),
             behind: first.max(behind),
         }
     }
@@ -162,22 +159,30 @@ impl<const SLOTS: usize> Settings<SLOTS> {
     /// HEARTBEAT.
     #[inline]
     pub(super) fn slice_mut(&mut self, start: u16, count: u16) -> &mut [u16] {
-        let start = place(start);
-        let end = start.saturating_add(usize::from(count));
-        self.values.get_mut(start..end).unwrap_or_default()
+        let values = if has_deadband::<B>(start) {
+            self.deadbands.as_flattened_mut()
+        } else {
+            &mut self.values[..]
+        };
+        values.get_mut(place(start, count)).unwrap_or_default()
     }
 
     /// Returns `count` values from an address on.
     #[inline]
     pub(super) fn slice(&self, start: u16, count: u16) -> &[u16] {
-        let start = place(start);
-        let end = start.saturating_add(usize::from(count));
-        self.values.get(start..end).unwrap_or_default()
+        let values = if has_deadband::<B>(start) {
+            self.deadbands.as_flattened()
+        } else {
+            &self.values[..]
+        };
+        values.get(place(start, count)).unwrap_or_default()
     }
 
     /// Returns the number of settings that differ from those of `from`.
     pub(super) fn differences(&self, from: &Self) -> u16 {
-        differences(&self.values, &from.values).wrapping_add(self.links.differences(&from.links))
+        differences(&self.values, &from.values)
+            + differences(self.deadbands.as_flattened(), from.deadbands.as_flattened())
+            + self.links.differences(&from.links)
     }
 
     /// Returns whether a setting that needs a restart differs from its value in force since the start.
@@ -188,7 +193,7 @@ impl<const SLOTS: usize> Settings<SLOTS> {
 
     /// Returns the settings that need a restart, in the order of their addresses.
     pub(super) fn restart_values(&self) -> impl Iterator<Item = u16> {
-        restart_addresses().map(|address| self.get(address))
+        restart_addresses::<B>().map(|address| self.get(address))
     }
 
     /// Returns the kind of the point of a setting by point, or none for other settings.
@@ -208,7 +213,10 @@ impl<const SLOTS: usize> Settings<SLOTS> {
         }
         self.put(module_of(port), code);
         // The settings by point, see `point_of`.
-        let rules = RULES.iter().filter(|rule| rule.count == points::COUNT);
+        let rules = B::ROW
+            .rules()
+            .iter()
+            .filter(|rule| rule.count == points::COUNT);
         for rule in rules {
             let kinds = before.points().into_iter().zip(after.points());
             for (point, (before_kind, kind)) in (first..).zip(kinds) {
@@ -222,14 +230,14 @@ impl<const SLOTS: usize> Settings<SLOTS> {
                 }
             }
         }
-        if !HAS_SLOTS {
+        if !B::ROW.is_modular() {
             self.set_ranges(port);
         }
-        if HAS_EVENTS {
+        if B::ROW.events {
             self.slice_mut(DEADBAND.wrapping_add(first), points::CHANNELS)
                 .fill(0);
         }
-        self.drop_links(Some(self.links.slot_of(first)));
+        self.drop_links(Some(Links::<B>::slot_of(first)));
     }
 
     /// Sets RANGE of the points of a port of the board to the only value that each takes.
@@ -243,7 +251,7 @@ impl<const SLOTS: usize> Settings<SLOTS> {
 
     /// Returns the only value of RANGE of an analog point that is part of the board.
     fn only_range(&self, point: u16) -> Option<u16> {
-        let fixed = self.board.fixed(point / points::CHANNELS + 1)?;
+        let fixed = B::ROW.fixed(point / points::CHANNELS + 1)?;
         let kind = self.kind(point);
         matches!(kind, Kind::WordInput | Kind::WordOutput)
             .then(|| fixed.range(point % points::CHANNELS, kind))
@@ -252,44 +260,69 @@ impl<const SLOTS: usize> Settings<SLOTS> {
     /// Returns whether the board allows a value, if it is one of RANGE.
     pub(super) fn takes_range(&self, address: u16, value: u16) -> bool {
         let point = address.wrapping_sub(RANGE);
-        HAS_SLOTS
+        B::ROW.is_modular()
             || point >= points::COUNT
             || self.only_range(point).is_none_or(|only| value == only)
     }
 
+    /// Returns whether the chosen module has a digital output at the point of a register of the links.
+    pub(super) fn has_link(&self, address: u16) -> bool {
+        Links::<B>::contain(address) && self.kind(links::point_of(address)) == Kind::BitOutput
+    }
+
+    /// Returns whether the chosen modules allow a link.
+    pub(super) fn allows(&self, link: &Link) -> bool {
+        link.suits(link.source().map_or(Kind::None, |source| self.kind(source)))
+    }
+
+    /// Sets to the default the links that the chosen modules do not allow, and those from or to a slot whose module has
+    /// changed. Returns their number.
+    fn drop_links(&mut self, changed: Option<usize>) -> u16 {
+        let mut dropped: u16 = 0;
+        if !Links::<B>::EXIST {
+            return dropped;
+        }
+        for slot in 0..B::PORTS {
+            for index in 0..OF_A_SLOT {
+                let link = self.links.link(slot, index);
+                let from = link.source().map(|source| Links::<B>::slot_of(source));
+                let to = Some(slot);
+                if changed.is_some() && (changed == from || changed == to) || !self.allows(link) {
+                    if let Some(link) = self.links.link_mut((slot, index)) {
+                        *link = Link::NONE;
+                    }
+                    dropped = dropped.saturating_add(1);
+                }
+            }
+        }
+        dropped
+    }
+
     fn put(&mut self, address: u16, value: u16) {
-        if Links::<SLOTS>::EXIST && !is_held(address) {
+        if Links::<B>::EXIST && !is_held::<B>(address) {
             self.links.set(address, value);
-        } else if let Some(held) = self.values.get_mut(place(address)) {
+        } else if let [held] = self.slice_mut(address, 1) {
             *held = value;
         }
     }
 }
 
-/// Returns the index of a setting that is not one of a link.
+/// Returns the indices of settings that are not those of links, by the low byte of the first one's address.
 #[inline]
-const fn place(address: u16) -> usize {
-    if has_deadband(address) {
-        DEADBANDS + (address - DEADBAND) as usize
-    } else {
-        (address & 0xFF) as usize
-    }
+fn place(start: u16, count: u16) -> Range<usize> {
+    let start = usize::from(start & 0xFF);
+    start..start.saturating_add(usize::from(count))
 }
 
 /// Returns whether an address is that of a setting, not one of a link.
 #[inline]
-const fn is_held(address: u16) -> bool {
-    address >> 8 == PAGE || has_deadband(address)
+const fn is_held<B: Board>(address: u16) -> bool {
+    address >> 8 == PAGE || has_deadband::<B>(address)
 }
 
 /// Returns whether the board has DEADBAND at this address.
-pub(super) const fn has_deadband(address: u16) -> bool {
-    HAS_EVENTS && deadband::contain(address)
-}
-
-/// Returns the number of words that differ. There are at most 288.
-pub(super) fn differences(a: &[u16], b: &[u16]) -> u16 {
-    a.iter().zip(b).map(|(a, b)| u16::from(a != b)).sum()
+pub(super) const fn has_deadband<B: Board>(address: u16) -> bool {
+    B::ROW.events && deadband::contain(address)
 }
 
 /// Returns whether a value of FORMAT is compatible with a value of MODE.
@@ -297,24 +330,6 @@ pub(super) fn format_suits_mode(format: u16, mode: u16) -> bool {
     match (Format::from_code(format), Mode::from_code(mode)) {
         (Some(format), Some(mode)) => format.suits(mode),
         _ => false,
-    }
-}
-
-/// Returns whether a port's MODULE may have this value. A port without points has no module.
-pub(super) fn takes_module(board: &Board, port: u16, code: u16) -> bool {
-    if HAS_SLOTS {
-        code == 0 || board.has_slot(port)
-    } else {
-        board.takes(port, code)
-    }
-}
-
-/// Returns the kinds of the points of a port with this module.
-pub fn kinds(board: &Board, port: u16, module: Module) -> [Kind; CHANNELS] {
-    if HAS_SLOTS {
-        module.points()
-    } else {
-        board.kinds(port, module)
     }
 }
 
@@ -335,8 +350,8 @@ const fn holds(rule: &Rule) -> bool {
 }
 
 /// Iterates over the addresses of the settings that need a restart.
-pub(super) fn restart_addresses() -> impl Iterator<Item = u16> {
-    Addresses::from(KEY)
+pub(super) fn restart_addresses<B: Board>() -> impl Iterator<Item = u16> {
+    Addresses::from::<B>(KEY)
         .filter(|(rule, _)| rule.in_force == InForce::Restart)
         .map(|(_, address)| address)
 }
@@ -348,9 +363,9 @@ struct Addresses {
 }
 
 impl Addresses {
-    const fn from(first: u16) -> Self {
+    fn from<B: Board>(first: u16) -> Self {
         Self {
-            rules: RULES,
+            rules: B::ROW.rules(),
             from: first,
         }
     }
@@ -375,14 +390,14 @@ impl Iterator for Addresses {
 }
 
 /// Iterates over the settings that differ from their defaults, see [`Settings::changed_from`].
-pub struct Changed<'a, const SLOTS: usize> {
-    settings: &'a Settings<SLOTS>,
+pub struct Changed<'a, B: Board> {
+    settings: &'a Settings<B>,
     held: Addresses,
     /// The register of a link, or of DEADBAND behind these, that is next after all others.
     behind: u16,
 }
 
-impl<const SLOTS: usize> Iterator for Changed<'_, SLOTS> {
+impl<B: Board> Iterator for Changed<'_, B> {
     type Item = (u16, u16);
 
     #[inline(never)]
@@ -397,14 +412,14 @@ impl<const SLOTS: usize> Iterator for Changed<'_, SLOTS> {
                 return Some((address, value));
             }
         }
-        while Links::<SLOTS>::contain(self.behind) {
+        while Links::<B>::contain(self.behind) {
             let address = self.behind;
             self.behind = address.wrapping_add(1);
             if let Some(value) = self.settings.links.changed(address) {
                 return Some((address, value));
             }
         }
-        while has_deadband(self.behind) {
+        while has_deadband::<B>(self.behind) {
             let address = self.behind;
             self.behind = address.wrapping_add(1);
             let value = self.settings.get(address);

@@ -12,19 +12,19 @@
 //! Therefore the document is never stored in RAM, and its CRC is continued from the CRC of the fixed part.
 //! docs/self-description.md describes the format.
 
-use core::{array, slice};
+use core::slice;
 
 use modbus_server::{Exception, Span, WordsOut, crc};
-use register_map::{Board, FixedPort};
+use register_map::FixedPort;
+use register_map::board::{Board, Each, Row};
 
-use crate::HAS_SLOTS;
 use crate::config::Config;
 
 include!(concat!(env!("OUT_DIR"), "/self_description.rs"));
 
 /// The part of a document that all units with this firmware share.
 #[derive(Clone, Copy, Debug)]
-pub struct Fixed {
+struct Fixed {
     /// The code of the board.
     board: u16,
     /// The document up to its ports.
@@ -40,8 +40,7 @@ impl Fixed {
     ///
     /// When the register map does not have the board. Call this function in a constant, so that it fails at compile
     /// time.
-    #[must_use]
-    pub const fn of(board: &Board) -> Self {
+    const fn of(board: &Row) -> Self {
         let mut rest: &[Self] = &BOARDS;
         while let [first, others @ ..] = rest {
             if first.board == board.code {
@@ -61,7 +60,8 @@ pub(super) struct Description {
 }
 
 impl Description {
-    pub(super) fn new<const SLOTS: usize>(fixed: &'static Fixed, config: &Config<SLOTS>) -> Self {
+    pub(super) fn new<B: Board>(config: &Config<B>) -> Self {
+        let fixed = const { &Fixed::of(B::ROW) };
         let ports = ports(config);
         let crc = ports.as_flattened().iter();
         let crc = crc.fold(fixed.crc, |crc, byte| crc::step(crc, *byte));
@@ -78,12 +78,8 @@ impl Description {
     /// # Errors
     ///
     /// Exception 02 for another file and for records after the end.
-    pub(super) fn check_read<const SLOTS: usize>(
-        &self,
-        file: u16,
-        records: Span,
-    ) -> Result<(), Exception> {
-        let end = usize::from(HEAD) + self.length::<SLOTS>().div_ceil(2);
+    pub(super) fn check_read<B: Board>(&self, file: u16, records: Span) -> Result<(), Exception> {
+        let end = usize::from(HEAD) + self.length::<B>().div_ceil(2);
         if file == FILE && records.end() as usize <= end {
             Ok(())
         } else {
@@ -92,14 +88,9 @@ impl Description {
     }
 
     /// Appends records that [`Self::check_read`] has accepted.
-    pub(super) fn read<const SLOTS: usize>(
-        &self,
-        config: &Config<SLOTS>,
-        records: Span,
-        out: &mut WordsOut<'_>,
-    ) {
+    pub(super) fn read<B: Board>(&self, config: &Config<B>, records: Span, out: &mut WordsOut<'_>) {
         let mut out = out.rest().iter_mut();
-        let head = [self.length::<SLOTS>() as u16, self.crc].map(u16::to_be_bytes);
+        let head = [self.length::<B>() as u16, self.crc].map(u16::to_be_bytes);
         let head = head.as_flattened();
         let start = usize::from(records.start()) * 2;
         copy(head, start, &mut out);
@@ -112,8 +103,8 @@ impl Description {
     }
 
     /// Returns the length of the document in bytes.
-    const fn length<const SLOTS: usize>(&self) -> usize {
-        self.fixed.document.len() + PORT_BYTES * SLOTS
+    const fn length<B: Board>(&self) -> usize {
+        self.fixed.document.len() + PORT_BYTES * B::PORTS
     }
 }
 
@@ -127,12 +118,12 @@ fn copy(bytes: &[u8], at: usize, out: &mut slice::IterMut<'_, u8>) {
 
 /// Returns the end of the document: for each port its number, the number of missing channels, and the module.
 #[inline(never)]
-fn ports<const SLOTS: usize>(config: &Config<SLOTS>) -> [[u8; PORT_BYTES]; SLOTS] {
-    let (first, modules) = (config.board().first_port, config.modules());
-    array::from_fn(|index| {
+fn ports<B: Board>(config: &Config<B>) -> Each<B::Ports, [u8; PORT_BYTES]> {
+    let (first, modules) = (B::ROW.first_port, config.modules());
+    Each::of(|index| {
         let module = modules.get(index).map_or(0, |module| module.code());
         let port = first.wrapping_add(index as u16);
-        let fixed = config.board().fixed(port).filter(|_| !HAS_SLOTS);
+        let fixed = B::ROW.fixed(port);
         let lacks = fixed.map_or(0, FixedPort::lacks);
         [port as u8, lacks, module as u8]
     })

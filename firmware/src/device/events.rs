@@ -6,6 +6,7 @@
 use heapless::Deque;
 use modbus_server::fast::{Kind as EventKind, Packet, Setting, Waiting};
 use modio_drivers::{CHANNELS, Kind};
+use register_map::board::{Board, Each};
 
 use super::port::IoPort;
 
@@ -17,10 +18,10 @@ const WORDS_MS: u32 = 100;
 /// The new level of a waiting edge. The index of the point is below it.
 const LEVEL: u8 = 1 << 7;
 
-/// What waits to be reported, of the points of `SLOTS` ports.
+/// What waits to be reported.
 #[derive(Debug)]
-pub struct Events<const SLOTS: usize> {
-    ports: [PortEvents; SLOTS],
+pub struct Events<B: Board> {
+    ports: Each<B::Ports, PortEvents>,
     edges: Deque<u8, EDGES>,
     /// Number of edges in front that the packet has.
     edges_in_packet: u8,
@@ -45,11 +46,11 @@ struct PortEvents {
     reported: [u16; CHANNELS],
 }
 
-impl<const SLOTS: usize> Events<SLOTS> {
+impl<B: Board> Events<B> {
     /// Returns the events of a unit that has just started: only that it has started.
     pub fn new() -> Self {
         Self {
-            ports: [PortEvents::default(); SLOTS],
+            ports: Each::all(PortEvents::default()),
             edges: Deque::new(),
             edges_in_packet: 0,
             lost: false,
@@ -70,7 +71,7 @@ impl<const SLOTS: usize> Events<SLOTS> {
     }
 
     /// Looks for changes of outputs, and of words every [`WORDS_MS`].
-    pub fn look(&mut self, slot: usize, port: &IoPort, now_ms: u32) {
+    pub fn look(&mut self, slot: usize, port: &IoPort<B>, now_ms: u32) {
         let Some(own) = self.ports.get_mut(slot).filter(|own| own.on != 0) else {
             return;
         };
@@ -92,7 +93,7 @@ impl<const SLOTS: usize> Events<SLOTS> {
 
     /// Switches the events of a point on or off: id and kind as in the request. Returns whether they are on.
     #[inline(never)]
-    pub fn set(&mut self, ports: &[IoPort], first: u16, kind: u8, id: u16, to: Setting) -> bool {
+    pub fn set(&mut self, ports: &[IoPort<B>], first: u16, kind: u8, id: u16, to: Setting) -> bool {
         let on = to != Setting::Off;
         if kind == EventKind::Unit as u8 && id == EventKind::STARTED {
             self.started = on;
@@ -137,7 +138,7 @@ impl<const SLOTS: usize> Events<SLOTS> {
     pub fn waiting(&self) -> Waiting {
         let mut count = self.edges.len() + usize::from(self.lost || self.lost_in_packet);
         let mut is_high = false;
-        for port in &self.ports {
+        for port in self.ports.iter() {
             let waits = port.due | port.in_packet;
             count += waits.count_ones() as usize;
             is_high |= waits & port.high != 0;
@@ -167,10 +168,10 @@ impl<const SLOTS: usize> Events<SLOTS> {
     /// Adds events to a packet: first the edges, in order, then the states of points. What an earlier packet has waits again
     /// before.
     #[inline(never)]
-    pub fn fill(&mut self, packet: &mut Packet, ports: &[IoPort], first: u16) {
+    pub fn fill(&mut self, packet: &mut Packet, ports: &[IoPort<B>], first: u16) {
         self.edges_in_packet = 0;
         self.lost |= core::mem::take(&mut self.lost_in_packet);
-        for own in &mut self.ports {
+        for own in self.ports.iter_mut() {
             own.due |= core::mem::take(&mut own.in_packet);
         }
         for edge in &self.edges {
@@ -214,14 +215,14 @@ impl<const SLOTS: usize> Events<SLOTS> {
             self.edges.pop_front();
         }
         self.lost_in_packet = false;
-        for own in &mut self.ports {
+        for own in self.ports.iter_mut() {
             own.in_packet = 0;
         }
     }
 }
 
 /// Returns the kind of a channel's events.
-fn kind_of(port: &IoPort, channel: usize) -> Option<EventKind> {
+fn kind_of<B: Board>(port: &IoPort<B>, channel: usize) -> Option<EventKind> {
     match port.kind(channel) {
         Kind::None => None,
         Kind::BitInput => Some(EventKind::DiscreteInput),

@@ -1,6 +1,7 @@
 //! Identification of the device: functions 11 and 2B/0E (V1.1b3 6.13, 6.21).
 
 use crate::config::Config;
+use register_map::board::Board;
 
 /// Number of hexadecimal digits of the unique identity.
 pub const SERIAL_LEN: usize = 24;
@@ -25,12 +26,12 @@ const FIRST_MODULE: u8 = 0x81;
 /// Returns an object of the device identification: 00 to 06 as in the standard; 80, the unique identity; from 81
 /// on, the module of each slot.
 #[must_use]
-pub fn object<'a, const SLOTS: usize>(
+pub fn object<'a, B: Board>(
     id: u8,
     serial: &'a [u8; SERIAL_LEN],
-    config: &Config<SLOTS>,
+    config: &Config<B>,
 ) -> Option<&'a [u8]> {
-    let board = config.board();
+    let board = B::ROW;
     Some(match id {
         0x00 => b"modio",
         0x01 => b"23835860",
@@ -51,7 +52,7 @@ pub fn object<'a, const SLOTS: usize>(
 mod tests {
     extern crate std;
 
-    use register_map::board::{MODIO_02, MODIO_08};
+    use register_map::board::{Modio02, Modio08};
     use register_map::configuration::module_of;
 
     use super::*;
@@ -59,7 +60,7 @@ mod tests {
 
     #[test]
     fn the_product_code_is_that_of_the_registers() {
-        let config = Config::<1>::new(&MODIO_02, Settings::defaults(&MODIO_02), false);
+        let config = Config::<Modio02>::new(Settings::defaults(), false);
         let code = std::format!("{:08X}", register_map::state::PRODUCT);
         assert_eq!(object(1, &[0; 24], &config), Some(code.as_bytes()));
         assert_eq!(object(4, &[0; 24], &config), Some(&b"modio-02"[..]));
@@ -67,7 +68,7 @@ mod tests {
 
     #[test]
     fn the_serial_number_is_the_unique_identity() {
-        let config = Config::<1>::new(&MODIO_02, Settings::defaults(&MODIO_02), false);
+        let config = Config::<Modio02>::new(Settings::defaults(), false);
         let serial = serial([0x0123, 0x4567, 0x89AB, 0xCDEF, 0x0000, 0xFFFF]);
         assert_eq!(&serial, b"0123456789ABCDEF0000FFFF");
         assert_eq!(object(0x80, &serial, &config), Some(&serial[..]));
@@ -76,8 +77,8 @@ mod tests {
     #[test]
     fn every_slot_has_an_object_for_its_module() {
         let pairs = [(module_of(1), 1), (module_of(4), 5)];
-        let (settings, _) = Settings::load(&MODIO_08, pairs.into_iter());
-        let config = Config::<4>::new(&MODIO_08, settings, false);
+        let (settings, _) = Settings::load(pairs.into_iter());
+        let config = Config::<Modio08>::new(settings, false);
         let modules = (0x81..=0x84).map(|id| object(id, &[0; 24], &config));
         assert!(modules.eq([&b"4di"[..], b"none", b"none", b"4ao"].map(Some)));
         assert_eq!(object(0x85, &[0; 24], &config), None);

@@ -1,16 +1,15 @@
 //! Outputs that start as they were: what is stored of them, what a reset keeps, and what a start does with both.
 
 use modio_drivers::{CHANNELS, Kind};
+use register_map::board::{Board, Each};
 use register_map::limits::RAW_MAX;
-use register_map::links;
 use register_map::record::{BITS, OUTPUTS, Record};
 
-use super::Device;
-use crate::KEEPS_OUTPUTS;
+use super::{Device, Points};
 use crate::kept_outputs::KeptOutputs;
 use crate::outputs::Outputs;
 
-impl<const SLOTS: usize> Device<SLOTS> {
+impl<B: Board> Device<B> {
     /// Sets the outputs at a start. `stored` is the last record, `kept` what a reset that was not a power-on has kept.
     ///
     /// - An output that is to start as it was has its kept value, else its stored one.
@@ -19,16 +18,18 @@ impl<const SLOTS: usize> Device<SLOTS> {
     /// - Every other output keeps START.
     #[inline(never)]
     pub fn start_outputs(&mut self, kept: Option<&KeptOutputs>, stored: Option<&Record<'_>>) {
-        if KEEPS_OUTPUTS && let Some(stored) = stored {
+        if B::ROW.keeps_outputs
+            && let Some(stored) = stored
+        {
             self.restore(stored);
         }
         let kept = kept.filter(|kept| kept.modules == self.modules_in_force());
-        let mut held = [0; SLOTS];
+        let mut held: Each<B::Ports, u8> = Each::all(0);
         for (slot, held) in held.iter_mut().enumerate() {
             let Some(kept) = kept else {
                 break;
             };
-            let first = self.points.first_of(slot);
+            let first = Points::<B>::first_of(slot);
             *held = (kept.held >> (first & 31)) as u8 & self.linking.with_any_level(slot);
             for channel in 0..CHANNELS {
                 let is_held = *held >> channel & 1 != 0;
@@ -47,7 +48,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
     /// Returns the modules in force, 4 bits for each port, port 1 lowest.
     #[must_use]
     pub fn modules_in_force(&self) -> u32 {
-        let first = u32::from(self.config.board().first_port.wrapping_sub(1));
+        let first = u32::from(B::ROW.first_port.wrapping_sub(1));
         let modules = (first..).zip(self.config.modules());
         modules.fold(0, |word, (port, module)| {
             word | u32::from(module.code()) << ((4 * port) & 31)
@@ -57,18 +58,18 @@ impl<const SLOTS: usize> Device<SLOTS> {
     /// Returns the outputs, by address, that are to have after a reset what they have now, because a link holds them.
     #[must_use]
     pub fn held_outputs(&self) -> u32 {
-        if !links::exist(SLOTS) {
+        if !B::ROW.has_links() {
             return 0;
         }
-        (0..SLOTS).fold(0, |mask, slot| {
-            mask | u32::from(self.linking.to_keep(slot)) << (self.points.first_of(slot) & 31)
+        (0..B::PORTS).fold(0, |mask, slot| {
+            mask | u32::from(self.linking.keeping(slot)) << (Points::<B>::first_of(slot) & 31)
         })
     }
 
     /// Returns the outputs, by address, that are at SAFE and were not commanded since.
     #[must_use]
     pub fn outputs_at_safe(&self) -> u32 {
-        self.points.at_safe() << (self.points.first_of(0) & 31)
+        self.points.at_safe() << (Points::<B>::first_of(0) & 31)
     }
 
     /// Returns what a master or a link commanded last of the outputs that are to start as they were, to be stored. Those
@@ -77,7 +78,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
     #[inline(never)]
     pub fn outputs(&self) -> Outputs {
         let mut outputs = Outputs::new();
-        for slot in 0..SLOTS {
+        for slot in 0..B::PORTS {
             for channel in 0..CHANNELS {
                 let Some(address) = self.kept_at(slot, channel) else {
                     continue;
@@ -102,7 +103,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
     /// Commands the outputs that are to start as they were, from a record. Ignores values of another module than the
     /// one in force, and values out of range.
     fn restore(&mut self, stored: &Record<'_>) {
-        for slot in 0..SLOTS {
+        for slot in 0..B::PORTS {
             for channel in 0..CHANNELS {
                 let Some(address) = self.kept_at(slot, channel) else {
                     continue;
@@ -132,7 +133,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
             return None;
         }
         let module = self.config.modules().get(slot)?.code();
-        let first = OUTPUTS | module << 8 | self.points.first_of(slot);
+        let first = OUTPUTS | module << 8 | Points::<B>::first_of(slot);
         match self.points.ports().get(slot)?.kind(channel) {
             Kind::BitOutput => Some(first | BITS),
             Kind::WordOutput => Some(first | channel as u16),

@@ -1,21 +1,16 @@
 //! Runs the links: inputs that switch outputs without a master.
 
 use modio_drivers::{CHANNELS, Channels, Codes, Kind};
-use register_map::links;
+use register_map::board::{Board, Each};
 
-use super::{Device, IoPort};
+use super::{Device, IoPort, Points};
 use crate::links::{AFTER_POWER_ON_MS, OF_A_SLOT, Outputs, Source, Sources};
-use crate::{HAS_EVENTS, HAS_SLOTS};
 
-/// Whether the board can have analog inputs. If not, the image does not contain the code that judges their codes. The
-/// eth-io5r has only relays and digital inputs, and no room for this code.
-const HAS_ANALOG: bool = HAS_SLOTS || HAS_EVENTS;
-
-/// The links of a device with `SLOTS` slots, while they run.
+/// The links of a device, while they run.
 #[derive(Debug)]
-pub(super) struct Linking<const SLOTS: usize> {
-    outputs: [Outputs; SLOTS],
-    sources: [Sources; SLOTS],
+pub(super) struct Linking<B: Board> {
+    outputs: Each<B::Ports, Outputs>,
+    sources: Each<B::Ports, Sources>,
     /// Whether the communication watchdog has expired, as read at the beginning of the scan under way.
     alone: bool,
     /// Whether a second of the uptime has begun with this scan. Words are compared with the thresholds only then.
@@ -24,11 +19,11 @@ pub(super) struct Linking<const SLOTS: usize> {
     holding: bool,
 }
 
-impl<const SLOTS: usize> Linking<SLOTS> {
-    pub const fn new() -> Self {
+impl<B: Board> Linking<B> {
+    pub fn new() -> Self {
         Self {
-            outputs: [const { Outputs::new() }; SLOTS],
-            sources: [const { Sources::new() }; SLOTS],
+            outputs: Each::all(Outputs::new()),
+            sources: Each::all(Sources::new()),
             alone: false,
             look: false,
             holding: false,
@@ -46,8 +41,8 @@ impl<const SLOTS: usize> Linking<SLOTS> {
     }
 
     /// Returns the outputs of a slot that keep their present value over a reset, channel 1 in bit 0.
-    pub fn to_keep(&self, slot: usize) -> u8 {
-        self.outputs.get(slot).map_or(0, Outputs::to_keep)
+    pub fn keeping(&self, slot: usize) -> u8 {
+        self.outputs.get(slot).map_or(0, Outputs::keeping)
     }
 
     /// Returns the outputs of a slot that are held, or will be held, by a link that always acts, channel 1 in bit 0.
@@ -56,11 +51,11 @@ impl<const SLOTS: usize> Linking<SLOTS> {
     }
 }
 
-impl<const SLOTS: usize> Device<SLOTS> {
+impl<B: Board> Device<B> {
     /// Prepares the links at a start. The sources have no values yet. `held` returns the outputs of a slot that links
     /// held before the reset, channel 1 in bit 0.
     pub(super) fn begin_links(&mut self, held: impl Fn(usize) -> u8) {
-        if !links::exist(SLOTS) {
+        if !B::ROW.has_links() {
             return;
         }
         let powered_on = self.state.was_powered_on();
@@ -86,12 +81,18 @@ impl<const SLOTS: usize> Device<SLOTS> {
     }
 
     /// Returns the channels of each slot whose settings have changed and are not applied yet, channel 1 in bit 0.
-    pub(super) fn changed_sources(&self) -> [u8; SLOTS] {
-        let mut changed = [0; SLOTS];
-        if !links::exist(SLOTS) {
+    pub(super) fn changed_sources(&self) -> Each<B::Ports, u8> {
+        let mut changed = Each::all(0);
+        if !B::ROW.has_links() {
             return changed;
         }
-        for (slot, (port, changed)) in self.points.ports().iter().zip(&mut changed).enumerate() {
+        for (slot, (port, changed)) in self
+            .points
+            .ports()
+            .iter()
+            .zip(changed.iter_mut())
+            .enumerate()
+        {
             for channel in 0..CHANNELS {
                 let point = self.config.point(slot, channel);
                 let differs = point.is_some_and(|to| port.setting(channel) != Some(&to.settings));
@@ -103,8 +104,8 @@ impl<const SLOTS: usize> Device<SLOTS> {
 
     /// Takes the links from the settings after these may have changed. `changed` has the channels of each slot whose
     /// settings differ from those before, channel 1 in bit 0.
-    pub(super) fn set_up_links(&mut self, changed: &[u8; SLOTS]) {
-        if !links::exist(SLOTS) {
+    pub(super) fn set_up_links(&mut self, changed: &[u8]) {
+        if !B::ROW.has_links() {
             return;
         }
         for (slot, channels) in changed.iter().enumerate() {
@@ -118,11 +119,11 @@ impl<const SLOTS: usize> Device<SLOTS> {
                 begin_source(sources, port, channel, true);
             }
         }
-        for slot in 0..SLOTS {
+        for slot in 0..B::PORTS {
             let written = self.config.take_written_links(slot);
             let links = (0..OF_A_SLOT).map(|index| self.config.link(slot, index));
             let of_changed = links.clone().enumerate().filter(|(_, link)| {
-                let place = link.source().and_then(|point| self.points.index_of(point));
+                let place = link.source().and_then(|point| Points::<B>::index_of(point));
                 place.is_some_and(|(slot, channel)| {
                     changed
                         .get(slot)
@@ -143,13 +144,13 @@ impl<const SLOTS: usize> Device<SLOTS> {
 
     /// Advances the links by `ms` milliseconds, at the beginning of a scan. `second`: a second of the uptime has begun.
     pub(super) fn tick_links(&mut self, ms: u32, second: bool) {
-        if !links::exist(SLOTS) {
+        if !B::ROW.has_links() {
             return;
         }
         self.linking.alone = self.comm_watchdog.has_expired();
         self.linking.look = second;
         self.linking.holding = false;
-        for outputs in &mut self.linking.outputs {
+        for outputs in self.linking.outputs.iter_mut() {
             outputs.tick(ms, self.linking.alone);
             self.linking.holding |= outputs.is_holding();
         }
@@ -158,12 +159,12 @@ impl<const SLOTS: usize> Device<SLOTS> {
     /// Stores the inputs of a slot as sources after a scan: the codes of the lines, and the digital inputs that have
     /// changed, channel 1 in bit 0. `ms` is the time since the previous scan in milliseconds.
     pub(super) fn scanned_sources(&mut self, slot: usize, codes: &Codes, changed: u8, ms: u32) {
-        if links::exist(SLOTS)
+        if B::ROW.has_links()
             && let Some(port) = self.points.ports().get(slot)
             && let Some(sources) = self.linking.sources.get_mut(slot)
         {
             for (channel, (code, settings)) in codes.iter().zip(port.settings()).enumerate() {
-                if HAS_ANALOG
+                if const { B::ROW.has_analog_inputs() }
                     && let Some(code) = code
                     && port.kind(channel) == Kind::WordInput
                 {
@@ -176,7 +177,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
 
     /// Ends the pulses of a slot's outputs, and runs the links to them with the inputs of the last scan.
     pub fn run_links(&mut self, slot: usize) {
-        if !links::exist(SLOTS) {
+        if !B::ROW.has_links() {
             return;
         }
         let now = self.state.millis();
@@ -217,7 +218,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
                 .ports()
                 .get(slot)
                 .and_then(|port| port.safe_bit(index % CHANNELS));
-            let place = link.source().and_then(|point| points.index_of(point));
+            let place = link.source().and_then(|point| Points::<B>::index_of(point));
             if let Some((of, channel)) = place
                 && let (Some(port), Some(sources)) = (points.ports().get(of), sources.get(of))
             {
@@ -227,7 +228,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
         outputs.hold();
         for index in bits(outputs.acting_edges(*alone)) {
             let link = config.link(slot, index);
-            let place = link.source().and_then(|point| points.index_of(point));
+            let place = link.source().and_then(|point| Points::<B>::index_of(point));
             if let Some((of, from)) = place
                 && sources
                     .get(of)
@@ -253,7 +254,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
         if let Some(port) = self.points.ports().get(slot) {
             channels = *port.channels();
         }
-        if links::exist(SLOTS)
+        if B::ROW.has_links()
             && let Some(outputs) = self.linking.outputs.get(slot)
         {
             channels.set_bits(outputs.held(), outputs.held_on());
@@ -264,7 +265,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
     /// Ends the hold of the links that act only while there is no master: a master has written the outputs of a span.
     #[inline(always)]
     pub(super) fn end_holds(&mut self, start: u16, count: u16) {
-        if links::exist(SLOTS) && self.linking.holding {
+        if B::ROW.has_links() && self.linking.holding {
             self.end_holds_now(start, count);
         }
     }
@@ -273,7 +274,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
     #[inline(never)]
     fn end_holds_now(&mut self, start: u16, count: u16) {
         for point in start..start.wrapping_add(count) {
-            if let Some((slot, channel)) = self.points.index_of(point)
+            if let Some((slot, channel)) = Points::<B>::index_of(point)
                 && let Some(outputs) = self.linking.outputs.get_mut(slot)
             {
                 outputs.end_hold(1 << channel);
@@ -283,7 +284,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
 }
 
 /// Starts the wait of a source until it has a value: after a reset, or after a change of the source's settings.
-fn begin_source(sources: &mut Sources, port: &IoPort, channel: usize, long: bool) {
+fn begin_source<B: Board>(sources: &mut Sources, port: &IoPort<B>, channel: usize, long: bool) {
     let is_digital = port.kind(channel) == Kind::BitInput;
     let debounce = port.setting(channel).filter(|_| is_digital);
     let debounce = debounce.map_or(0, |setting| setting.filter);
@@ -296,13 +297,13 @@ fn begin_source(sources: &mut Sources, port: &IoPort, channel: usize, long: bool
 }
 
 /// Returns the level, the word or the missing value of a channel, for a level link.
-fn source(port: &IoPort, sources: &Sources, channel: usize) -> Source {
+fn source<B: Board>(port: &IoPort<B>, sources: &Sources, channel: usize) -> Source {
     let channels = port.channels();
     if !sources.has_value(channel) {
         Source::NoValue {
             good: sources.is_good(channel),
         }
-    } else if !HAS_ANALOG || port.kind(channel) == Kind::BitInput {
+    } else if !const { B::ROW.has_analog_inputs() } || port.kind(channel) == Kind::BitInput {
         Source::Bit(channels.bit(channel))
     } else if sources.is_uncertain(channel) {
         Source::Uncertain

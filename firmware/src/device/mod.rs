@@ -36,13 +36,13 @@ use modbus_server::{
     Adu, Bits, BitsOut, DataModel, Exception, Server, Span, Table, TextOut, Words, WordsOut,
 };
 use modio_drivers::{CHANNELS, Channels, Codes};
+use register_map::board::Board;
 use register_map::configuration::COMMAND;
 use register_map::update::status;
 use register_map::{codes::Command, counters, edges, fault, name, second, state as state_map};
 
 pub use comm_watchdog::CommWatchdog;
 use description::Description;
-pub use description::Fixed;
 use edge_log::EdgeLog;
 use events::Events;
 use linking::Linking;
@@ -52,22 +52,21 @@ pub use state::{Identity, State};
 
 use crate::config::{Config, LineName, Origin, Point};
 use crate::update::{TRIAL_S, Update, order_of};
-use crate::{HAS_EVENTS, HAS_SLOTS};
 
-/// The device behind the line, on a board with `SLOTS` slots.
+/// The device behind the line.
 #[derive(Debug)]
-pub struct Device<const SLOTS: usize> {
+pub struct Device<B: Board> {
     /// The values of all channels.
-    pub points: Points<SLOTS>,
+    pub points: Points<B>,
     /// The settings.
-    pub config: Config<SLOTS>,
+    pub config: Config<B>,
     /// Identity and health.
-    pub state: State,
+    pub state: State<B>,
     description: Description,
     comm_watchdog: CommWatchdog,
     edges: EdgeLog,
-    linking: Linking<SLOTS>,
-    events: Events<SLOTS>,
+    linking: Linking<B>,
+    events: Events<B>,
     /// A command from a request, to be executed when its reply has been sent.
     ordered: Option<Command>,
     /// The unit address, after a master has changed it.
@@ -118,20 +117,20 @@ const READ_ONLY: [&[Range<u16>]; 5] = [
 
 impl Block {
     #[inline(always)]
-    const fn of(span: Span) -> Self {
+    const fn of<B: Board>(span: Span) -> Self {
         // Most requests are for points.
         if span.start() < register_map::points::COUNT {
             Self::Points
         } else {
-            Self::of_others(span)
+            Self::of_others::<B>(span)
         }
     }
 
     #[inline(never)]
-    const fn of_others(span: Span) -> Self {
+    const fn of_others<B: Board>(span: Span) -> Self {
         match span.start().to_be_bytes() {
             [1 | 4, _] => Self::Config,
-            [5, _] if HAS_EVENTS => Self::Config,
+            [5, _] if B::ROW.events => Self::Config,
             [0 | 2, _] | [3, 0x80..=0xFF] => Self::ReadOnly,
             [3, _] => Self::Pulses,
             _ => Self::Points,
@@ -139,21 +138,20 @@ impl Block {
     }
 }
 
-impl<const SLOTS: usize> Device<SLOTS> {
+impl<B: Board> Device<B> {
     /// Creates a device with these settings in `place`, because it is too large to be moved over the stack. The outputs
-    /// are set to START. `description` is that of the board.
+    /// are set to START.
     #[must_use]
     #[inline(never)]
-    pub fn new_in<'a>(
-        place: &'a mut MaybeUninit<Self>,
-        config: Config<SLOTS>,
+    pub fn new_in(
+        place: &mut MaybeUninit<Self>,
+        config: Config<B>,
         identity: Identity,
-        description: &'static Fixed,
-    ) -> &'a mut Self {
+    ) -> &mut Self {
         let device = place.write(Self {
             points: Points::new(&config),
-            state: State::new(config.board(), identity),
-            description: Description::new(description, &config),
+            state: State::new(identity),
+            description: Description::new(&config),
             comm_watchdog: CommWatchdog::new(),
             edges: EdgeLog::new(),
             linking: Linking::new(),
@@ -184,7 +182,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
     }
 
     /// Passes the settings in force of every point to `act`, with the point's port and channel.
-    fn for_each_point(&mut self, act: fn(&mut IoPort, usize, Point)) {
+    fn for_each_point(&mut self, act: fn(&mut IoPort<B>, usize, Point)) {
         for (index, port) in self.points.ports_mut().iter_mut().enumerate() {
             for channel in 0..CHANNELS {
                 if let Some(point) = self.config.point(index, channel) {
@@ -233,7 +231,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
         if ms > LONGEST_MS {
             self.edges.set_late(now);
         }
-        let first = self.points.first_of(slot);
+        let first = Points::<B>::first_of(slot);
         let Some(port) = self.points.ports_mut().get_mut(slot) else {
             return;
         };
@@ -242,7 +240,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
         let Some(port) = self.points.ports().get(slot) else {
             return;
         };
-        if HAS_EVENTS {
+        if B::ROW.events {
             self.events.look(slot, port, now);
         }
         if edges == 0 {
@@ -253,7 +251,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
                 let point = first.wrapping_add(channel as u16);
                 let level = channels.bit(channel);
                 self.edges.add(point, level, now, settings.filter);
-                if HAS_EVENTS {
+                if B::ROW.events {
                     self.events.edge(slot, channel, level);
                 }
             }
@@ -361,15 +359,14 @@ impl<const SLOTS: usize> Device<SLOTS> {
     }
 
     /// Returns whether these are counters of a second line that the board does not have.
-    const fn lacks(&self, span: Span) -> bool {
-        let has_second = HAS_SLOTS || self.config.board().second.is_some();
-        !has_second && matches!(span.start(), second::BUS_MESSAGES..=second::T15_GAPS)
+    const fn lacks(span: Span) -> bool {
+        B::ROW.second.is_none() && matches!(span.start(), second::BUS_MESSAGES..=second::T15_GAPS)
     }
 
     /// Returns a register of the board's name.
     fn name_word(&self, address: u16) -> u16 {
         let index = usize::from(address.wrapping_sub(name::NAME));
-        let byte = self.config.board().name.as_bytes().get(index);
+        let byte = B::ROW.name.as_bytes().get(index);
         byte.copied().unwrap_or_default().into()
     }
 
@@ -422,17 +419,17 @@ fn check_exists(blocks: &[&[Range<u16>]], span: Span) -> Result<(), Exception> {
 }
 
 /// Functions 01 and 02 read the same bits, and 03 and 04 the same words.
-impl<const SLOTS: usize> DataModel for Device<SLOTS> {
+impl<B: Board> DataModel for Device<B> {
     fn check_read_bits(&self, _: Table, span: Span) -> Result<(), Exception> {
         self.points.check_read_bits(span)
     }
 
     fn check_read_words(&self, _: Table, span: Span) -> Result<(), Exception> {
-        match Block::of(span) {
+        match Block::of::<B>(span) {
             Block::Points => self.points.check_read_words(span),
             Block::Config => self.config.check_read(span),
             Block::Pulses => check_exists(&[counters::SPANS], span),
-            Block::ReadOnly if self.lacks(span) => Err(Exception::IllegalDataAddress),
+            Block::ReadOnly if Self::lacks(span) => Err(Exception::IllegalDataAddress),
             Block::ReadOnly => check_exists(&READ_ONLY, span),
         }
     }
@@ -442,7 +439,7 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
     }
 
     fn check_write_words(&self, span: Span, words: Words<'_>) -> Result<(), Exception> {
-        match Block::of(span) {
+        match Block::of::<B>(span) {
             Block::Points => self.points.check_write_words(span, words),
             Block::Config => {
                 let checked = self.config.check_write(span, words);
@@ -471,7 +468,7 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
     #[inline]
     fn before_read_words(&mut self, span: Span, server: &Server) {
         // The request may have written settings, which may change anything else.
-        if !matches!(Block::of(span), Block::Config) {
+        if !matches!(Block::of::<B>(span), Block::Config) {
             self.settings_may_have_changed();
         }
         if span.start() >= state_map::PRODUCT_CODE {
@@ -480,7 +477,7 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
     }
 
     fn read_words(&self, _: Table, span: Span, out: &mut WordsOut<'_>) {
-        match Block::of(span) {
+        match Block::of::<B>(span) {
             Block::Points => self.points.read_words(span, out),
             Block::Config => self.config.read(span, out),
             Block::Pulses | Block::ReadOnly => span
@@ -495,7 +492,7 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
     }
 
     fn write_words(&mut self, span: Span, words: Words<'_>) {
-        match Block::of(span) {
+        match Block::of::<B>(span) {
             Block::Points => self.points.write_words(span, words),
             Block::Config => {
                 self.ordered = self.config.write(span, words);
@@ -503,7 +500,9 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
             Block::Pulses => self.points.clear_pulses(span),
             // Of these registers `check_write_words` accepts only UNIT_BY_SERIAL.
             Block::ReadOnly => {
-                if !HAS_SLOTS && let Some(unit) = words.get(0) {
+                if !B::ROW.is_modular()
+                    && let Some(unit) = words.get(0)
+                {
                     self.config.set_unit(unit);
                     self.new_unit = Some(unit as u8);
                 }
@@ -526,7 +525,7 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
         if file == edges::log::FILE {
             return EdgeLog::check_read(records);
         }
-        self.description.check_read::<SLOTS>(file, records)
+        self.description.check_read::<B>(file, records)
     }
 
     fn read_file(&self, file: u16, records: Span, out: &mut WordsOut<'_>) {
@@ -575,7 +574,7 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
 
     /// Function 70 with the unit's own address: which points report events.
     fn check_custom(&self, code: u8, data: &[u8]) -> Result<(), Exception> {
-        let is_served = HAS_EVENTS
+        let is_served = B::ROW.events
             && code == fast::FUNCTION
             && self.state.reports_events()
             && self.config.origin_line() == LineName::Rs485;
@@ -586,7 +585,7 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
     }
 
     fn serve_custom(&mut self, _: u8, adu: &mut Adu) {
-        let (ports, first) = (self.points.ports(), self.points.first_of(0));
+        let (ports, first) = (self.points.ports(), Points::<B>::first_of(0));
         fast::apply_settings(adu, |kind, id, to| {
             self.events.set(ports, first, kind, id, to)
         });
@@ -608,7 +607,7 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
     }
 }
 
-impl<const SLOTS: usize> EventSource for Device<SLOTS> {
+impl<B: Board> EventSource for Device<B> {
     fn waiting(&self) -> Waiting {
         self.events.waiting()
     }
@@ -622,7 +621,7 @@ impl<const SLOTS: usize> EventSource for Device<SLOTS> {
     }
 
     fn fill(&mut self, packet: &mut Packet) {
-        let first = self.points.first_of(0);
+        let first = Points::<B>::first_of(0);
         self.events.fill(packet, self.points.ports(), first);
     }
 

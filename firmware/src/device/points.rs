@@ -4,53 +4,49 @@ use core::ops::Range;
 
 use modbus_server::{Bits, BitsOut, Exception, Span, Words, WordsOut};
 use modio_drivers::{CHANNELS, ChannelStatus, Kind};
+use register_map::board::{Board, Each};
 use register_map::{counters, edges, limits, points};
 
 use super::port::IoPort;
-use crate::KEEPS_OUTPUTS;
-use crate::config::{Config, kinds};
+use crate::config::Config;
 use crate::links::Act;
 
 /// The points of the board's slots. Their port numbers are consecutive.
 #[derive(Debug)]
-pub struct Points<const SLOTS: usize> {
-    /// Address of the first point of the first port.
-    first: u16,
-    ports: [IoPort; SLOTS],
+pub struct Points<B: Board> {
+    ports: Each<B::Ports, IoPort<B>>,
     /// Outputs that are at SAFE and were not commanded since, the first port's channel 1 in bit 0.
-    at_safe: [u32; KEEPS_OUTPUTS as usize],
+    at_safe: Each<B::Kept, u32>,
 }
 
-impl<const SLOTS: usize> Points<SLOTS> {
+impl<B: Board> Points<B> {
     /// Creates the points of the modules in force, with every value 0.
     #[must_use]
-    pub fn new(config: &Config<SLOTS>) -> Self {
-        let mut ports = config.board().ports();
+    pub fn new(config: &Config<B>) -> Self {
         Self {
-            first: config.board().points().start,
-            ports: config.modules().map(|module| {
-                let port = ports.next().unwrap_or_default();
-                IoPort::new(kinds(config.board(), port, module))
-            }),
-            at_safe: [0; KEEPS_OUTPUTS as usize],
+            ports: Each::of(|slot| IoPort::new(config.kinds(slot))),
+            at_safe: Each::all(0),
         }
     }
 
     /// Returns the ports with a slot.
     #[must_use]
-    pub const fn ports(&self) -> &[IoPort; SLOTS] {
+    pub fn ports(&self) -> &[IoPort<B>] {
         &self.ports
     }
 
     /// Returns the ports with a slot, to be changed.
-    pub const fn ports_mut(&mut self) -> &mut [IoPort; SLOTS] {
+    pub fn ports_mut(&mut self) -> &mut [IoPort<B>] {
         &mut self.ports
     }
 
     /// Returns the address of the first point of a port, given the port's index.
     #[must_use]
-    pub const fn first_of(&self, index: usize) -> u16 {
-        self.first.wrapping_add((index * CHANNELS) as u16)
+    pub fn first_of(index: usize) -> u16 {
+        B::ROW
+            .points()
+            .start
+            .wrapping_add((index * CHANNELS) as u16)
     }
 
     /// Returns whether a channel of any port cannot be read or driven.
@@ -68,14 +64,14 @@ impl<const SLOTS: usize> Points<SLOTS> {
     /// Returns how many points of ports with slots precede a point. Returns a large number for a port in front of
     /// all ports with a slot.
     #[inline]
-    fn index(&self, point: u16) -> usize {
-        usize::from(point.wrapping_sub(self.first))
+    fn index(point: u16) -> usize {
+        usize::from(point.wrapping_sub(B::ROW.points().start))
     }
 
     /// Returns the indices of a span's points.
     #[inline]
-    fn indices(&self, span: Span) -> Range<usize> {
-        let start = self.index(span.start());
+    fn indices(span: Span) -> Range<usize> {
+        let start = Self::index(span.start());
         start..start + usize::from(span.count())
     }
 
@@ -83,25 +79,25 @@ impl<const SLOTS: usize> Points<SLOTS> {
     /// slot.
     // Without this attribute the compiler emits a call for every point of a request.
     #[inline(always)]
-    fn place(&self, index: usize) -> Option<(&IoPort, usize)> {
+    fn place(&self, index: usize) -> Option<(&IoPort<B>, usize)> {
         Some((self.ports.get(index / CHANNELS)?, index % CHANNELS))
     }
 
     #[inline(always)]
-    fn place_mut(&mut self, index: usize) -> Option<(&mut IoPort, usize)> {
+    fn place_mut(&mut self, index: usize) -> Option<(&mut IoPort<B>, usize)> {
         Some((self.ports.get_mut(index / CHANNELS)?, index % CHANNELS))
     }
 
     /// Returns the slot and the channel of a point.
-    pub(super) fn index_of(&self, point: u16) -> Option<(usize, usize)> {
-        let index = self.index(point);
-        (index < SLOTS * CHANNELS).then_some((index / CHANNELS, index % CHANNELS))
+    pub(super) fn index_of(point: u16) -> Option<(usize, usize)> {
+        let index = Self::index(point);
+        (index < B::PORTS * CHANNELS).then_some((index / CHANNELS, index % CHANNELS))
     }
 
     /// Returns the status of a point, 0 to 31: good for a point that does not exist.
     #[must_use]
     pub fn status_of(&self, point: u16) -> ChannelStatus {
-        self.place(self.index(point))
+        self.place(Self::index(point))
             .map_or(ChannelStatus::Good, |(port, channel)| {
                 port.channels.status(channel)
             })
@@ -112,7 +108,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
     fn check_kinds(&self, span: Span, kinds: Kinds, needed: Kinds) -> Result<(), Exception> {
         let mut fails = 0;
         // A long span fails at the first address after the last port.
-        for index in self.indices(span) {
+        for index in Self::indices(span) {
             match self.place(index) {
                 Some((port, channel)) if kinds.contain(port.kind(channel)) => {
                     fails |= needed.0 >> port.kind(channel) as u8 & port.failing() >> channel;
@@ -167,7 +163,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
         if checked == Err(Exception::IllegalDataAddress) {
             return checked;
         }
-        let allowed = self.indices(span).zip(words.iter()).all(|(index, word)| {
+        let allowed = Self::indices(span).zip(words.iter()).all(|(index, word)| {
             let place = self.place(index);
             place
                 .and_then(|(port, channel)| port.setting(channel))
@@ -184,7 +180,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
 
     /// Reads bit points that the check has accepted.
     pub fn read_bits(&self, span: Span, out: &mut BitsOut<'_>) {
-        for index in self.indices(span) {
+        for index in Self::indices(span) {
             let place = self.place(index);
             out.push(place.is_some_and(|(port, channel)| port.channels.bit(channel)));
         }
@@ -192,7 +188,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
 
     /// Reads word points that the check has accepted.
     pub fn read_words(&self, span: Span, out: &mut WordsOut<'_>) {
-        for index in self.indices(span) {
+        for index in Self::indices(span) {
             let place = self.place(index);
             out.push(place.map_or(0, |(port, channel)| port.channels.word(channel)));
         }
@@ -201,7 +197,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
     /// Writes bit points that the check has accepted.
     pub fn write_bits(&mut self, span: Span, bits: Bits<'_>) {
         self.leave_safe(span);
-        for (index, bit) in self.indices(span).zip(bits.iter()) {
+        for (index, bit) in Self::indices(span).zip(bits.iter()) {
             if let Some((port, channel)) = self.place_mut(index) {
                 port.set_output(channel, bit);
             }
@@ -211,7 +207,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
     /// Writes word points that the check has accepted.
     pub fn write_words(&mut self, span: Span, words: Words<'_>) {
         self.leave_safe(span);
-        for (index, word) in self.indices(span).zip(words.iter()) {
+        for (index, word) in Self::indices(span).zip(words.iter()) {
             if let Some((port, channel)) = self.place_mut(index) {
                 port.channels.set_word(channel, word);
             }
@@ -231,14 +227,14 @@ impl<const SLOTS: usize> Points<SLOTS> {
         if let Some(port) = self.ports.get_mut(slot) {
             port.hold(held, on);
         }
-        for at_safe in &mut self.at_safe {
+        for at_safe in self.at_safe.iter_mut() {
             *at_safe &= !(u32::from(held) << ((slot * CHANNELS) & 31));
         }
     }
 
     /// Sets the outputs to SAFE, but those of each slot that `but` returns, channel 1 in bit 0.
     pub(super) fn go_safe(&mut self, but: impl Fn(usize) -> u8) {
-        for index in 0..SLOTS * CHANNELS {
+        for index in 0..B::PORTS * CHANNELS {
             if but(index / CHANNELS) >> (index % CHANNELS) & 1 != 0 {
                 continue;
             }
@@ -263,7 +259,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
                 port.keep_before_safe(channel, before);
             }
         }
-        for marks in &mut self.at_safe {
+        for marks in self.at_safe.iter_mut() {
             *marks |= u32::from(at_safe) << (index & 31);
         }
     }
@@ -292,14 +288,14 @@ impl<const SLOTS: usize> Points<SLOTS> {
     fn leave_safe(&mut self, span: Span) {
         // Most requests end here, after a few instructions.
         if self.at_safe() != 0 {
-            self.leave_safe_now(self.index(span.start()), span.count());
+            self.leave_safe_now(Self::index(span.start()), span.count());
         }
     }
 
     #[cold]
     #[inline(never)]
     fn leave_safe_now(&mut self, index: usize, count: u16) {
-        for at_safe in &mut self.at_safe {
+        for at_safe in self.at_safe.iter_mut() {
             // `count` is at least 1, and the points are within the 32.
             let points = u32::MAX >> ((32 - u32::from(count)) & 31) << (index & 31);
             *at_safe &= !points;
@@ -313,8 +309,9 @@ impl<const SLOTS: usize> Points<SLOTS> {
     #[must_use]
     pub fn input_word(&self, address: u16) -> u16 {
         // Both blocks begin at a multiple of their length.
-        let place =
-            self.place(self.index(address % (points::COUNT * counters::WORDS) / counters::WORDS));
+        let place = self.place(Self::index(
+            address % (points::COUNT * counters::WORDS) / counters::WORDS,
+        ));
         let value = place.and_then(|(port, channel)| {
             let values = if address < edges::LAST_EDGE {
                 port.pulses()
@@ -335,7 +332,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
     pub fn clear_pulses(&mut self, span: Span) {
         for address in span.addresses() {
             let point = address.wrapping_sub(counters::PULSES) / counters::WORDS;
-            if let Some((port, channel)) = self.place_mut(self.index(point)) {
+            if let Some((port, channel)) = self.place_mut(Self::index(point)) {
                 port.clear_pulses(channel);
             }
         }

@@ -1,19 +1,16 @@
 //! The points of one port: the values of its module's channels and the pulse counters of its digital inputs.
 
 use modio_drivers::{CHANNELS, ChannelSettings, ChannelStatus, Channels, Code, Kind, scale};
+use register_map::board::{Board, Each};
 use register_map::codes::ModuleState;
 use register_map::limits;
 
 use crate::config::Point;
 use crate::links::Act;
-use crate::{HAS_EVENTS, KEEPS_OUTPUTS};
-
-/// Number of channels whose values before SAFE are kept.
-const KEPT: usize = if KEEPS_OUTPUTS { CHANNELS } else { 0 };
 
 /// The points of one port.
-#[derive(Debug)]
-pub struct IoPort {
+#[derive(Clone, Copy, Debug)]
+pub struct IoPort<B: Board> {
     kinds: [Kind; CHANNELS],
     settings: [ChannelSettings; CHANNELS],
     /// Inputs as last scanned, outputs as commanded, words in the unit set by SCALE.
@@ -28,16 +25,16 @@ pub struct IoPort {
     /// Outputs with a pulse, channel 1 in bit 0.
     pulsing: u8,
     /// Changes of words that are events; 0 for 1/256 of the range.
-    deadbands: [u16; if HAS_EVENTS { CHANNELS } else { 0 }],
+    deadbands: Each<B::Events, [u16; CHANNELS]>,
     /// What was commanded last, raw, of each output that was set to SAFE since then.
-    before_safe: [u16; KEPT],
+    before_safe: Each<B::Kept, [u16; CHANNELS]>,
     /// The inputs have been scanned once. From then on a rising edge counts.
     scanned: bool,
     /// Channels that cannot be read or driven, channel 1 in bit 0.
     failing: u8,
 }
 
-impl IoPort {
+impl<B: Board> IoPort<B> {
     /// Creates the points of a port with channels of these kinds, with every value 0.
     #[must_use]
     pub fn new(kinds: [Kind; CHANNELS]) -> Self {
@@ -50,8 +47,8 @@ impl IoPort {
             edges: [0; CHANNELS],
             pulse_ends: [0; CHANNELS],
             pulsing: 0,
-            deadbands: Default::default(),
-            before_safe: [0; KEPT],
+            deadbands: Each::all([0; CHANNELS]),
+            before_safe: Each::all([0; CHANNELS]),
             scanned: false,
             failing: 0,
         }
@@ -72,8 +69,7 @@ impl IoPort {
         }
         *settings = to.settings;
         *safe = to.safe;
-        #[cfg(not(feature = "small"))]
-        if let Some(deadband) = self.deadbands.get_mut(channel) {
+        if let Some(deadband) = self.deadbands.as_flattened_mut().get_mut(channel) {
             *deadband = to.deadband;
         }
     }
@@ -228,7 +224,11 @@ impl IoPort {
 
     /// Returns what was commanded, raw, before the output was set to SAFE.
     pub(super) fn before_safe(&self, channel: usize) -> u16 {
-        self.before_safe.get(channel).copied().unwrap_or_default()
+        self.before_safe
+            .as_flattened()
+            .get(channel)
+            .copied()
+            .unwrap_or_default()
     }
 
     /// Returns the value of a channel: 0 or 1 for a bit.
@@ -241,7 +241,7 @@ impl IoPort {
 
     /// Returns the smallest change of a word that is an event.
     pub(super) fn deadband(&self, channel: usize) -> u16 {
-        if let Some(set) = self.deadbands.get(channel)
+        if let Some(set) = self.deadbands.as_flattened().get(channel)
             && *set != 0
         {
             return *set;
@@ -265,7 +265,7 @@ impl IoPort {
 
     /// Keeps what was commanded, raw, before an output was set to SAFE.
     pub(super) fn keep_before_safe(&mut self, channel: usize, before: u16) {
-        if let Some(place) = self.before_safe.get_mut(channel) {
+        if let Some(place) = self.before_safe.as_flattened_mut().get_mut(channel) {
             *place = before;
         }
     }

@@ -1,7 +1,13 @@
 //! Identity and health: the read-only registers at 0x0200 and the fault record at 0x0260.
 
 use modbus_server::Counters;
-use register_map::{Board, codes::ModuleState, fault, points::PORTS, second, state as at};
+use register_map::{
+    board::{Board, Each},
+    codes::ModuleState,
+    fault,
+    points::PORTS,
+    second, state as at,
+};
 
 use super::identification::{self, SERIAL_LEN};
 use super::points::{Points, words_of};
@@ -49,7 +55,7 @@ const fn number(text: &str) -> u16 {
 
 /// Identity and health.
 #[derive(Debug)]
-pub struct State {
+pub struct State<B: Board> {
     identity: Identity,
     /// The unique identity as text.
     serial: [u8; SERIAL_LEN],
@@ -64,7 +70,7 @@ pub struct State {
     /// The counters of the RS-485 line, copied from its server before a read over this line, and ten times a second.
     counters: Counters,
     /// The counters of the second line, copied in the same way. Zero while a radio is off.
-    second_counters: Counters,
+    second_counters: Each<B::Second, Counters>,
     /// Whether the radio works; `None` without one, and while it is off or being set up for the first time.
     pub radio_works: Option<bool>,
     /// The smallest amount of free stack so far, in bytes.
@@ -73,19 +79,19 @@ pub struct State {
     pub line_repairs: u16,
 }
 
-impl State {
+impl<B: Board> State<B> {
     /// Returns the state at the start.
     #[must_use]
-    pub fn new(board: &Board, identity: Identity) -> Self {
+    pub fn new(identity: Identity) -> Self {
         Self {
-            server_id: [board.code as u8],
+            server_id: [B::ROW.code as u8],
             serial: identification::serial(identity.unique_id),
             identity,
             millis: 0,
             part_ms: 0,
             uptime_s: 0,
             counters: Counters::default(),
-            second_counters: Counters::default(),
+            second_counters: Each::all(Counters::default()),
             radio_works: None,
             stack_free: 0,
             line_repairs: 0,
@@ -110,10 +116,10 @@ impl State {
     }
 
     /// Returns the counters of a line, to be updated.
-    pub const fn counters_of(&mut self, line: LineName) -> &mut Counters {
-        match line {
-            LineName::Rs485 => &mut self.counters,
-            LineName::Second => &mut self.second_counters,
+    pub fn counters_of(&mut self, line: LineName) -> &mut Counters {
+        match (line, self.second_counters.first_mut()) {
+            (LineName::Second, Some(counters)) => counters,
+            _ => &mut self.counters,
         }
     }
 
@@ -156,12 +162,7 @@ impl State {
     }
 
     /// Returns a register other than the status, or 0 for one that does not exist.
-    pub(super) fn word<const SLOTS: usize>(
-        &self,
-        address: u16,
-        points: &Points<SLOTS>,
-        config: &Config<SLOTS>,
-    ) -> u16 {
+    pub(super) fn word(&self, address: u16, points: &Points<B>, config: &Config<B>) -> u16 {
         let [product_high, product_low] = words_of(at::PRODUCT);
         let [uptime_high, uptime_low] = words_of(self.uptime_s);
         let [millis_high, millis_low] = words_of(self.millis);
@@ -174,7 +175,7 @@ impl State {
             at::FIRMWARE_VERSION => version,
             at::FIRMWARE_PATCH => patch,
             at::MAP_VERSION => at::MAP_VERSION_VALUE,
-            at::BOARD => config.board().code,
+            at::BOARD => B::ROW.code,
             at::UNIT_ADDRESS => self.identity.unit.into(),
             at::RESET_CAUSE => self.identity.reset_cause.into(),
             at::UPTIME => uptime_high,
@@ -193,17 +194,12 @@ impl State {
     }
 
     /// Returns a register of the blocks with one register per port, counter or point.
-    fn by_index<const SLOTS: usize>(
-        &self,
-        address: u16,
-        points: &Points<SLOTS>,
-        config: &Config<SLOTS>,
-    ) -> u16 {
+    fn by_index(&self, address: u16, points: &Points<B>, config: &Config<B>) -> u16 {
         let nth = |words: &[u16], first: u16| {
             let index = usize::from(address.wrapping_sub(first));
             words.get(index).copied().unwrap_or_default()
         };
-        let slot = |index: u16| usize::from((index + 1).wrapping_sub(config.board().first_port));
+        let slot = |index: u16| usize::from((index + 1).wrapping_sub(B::ROW.first_port));
         match address.wrapping_sub(at::MODULE_IN_FORCE) {
             index if index < PORTS => {
                 let module = config.modules().get(slot(index));
@@ -216,7 +212,10 @@ impl State {
             _ if address < at::BUS_MESSAGES => nth(&self.identity.unique_id, at::UNIQUE_ID),
             _ if address < at::CHANNEL_STATUS => nth(&self.counters.as_words(), at::BUS_MESSAGES),
             _ if address >= second::BUS_MESSAGES => {
-                nth(&self.second_counters.as_words(), second::BUS_MESSAGES)
+                let counters = self.second_counters.first();
+                counters.map_or(0, |counters| {
+                    nth(&counters.as_words(), second::BUS_MESSAGES)
+                })
             }
             _ => points
                 .status_of(address.wrapping_sub(at::CHANNEL_STATUS))

@@ -176,7 +176,7 @@ impl GapTimer for FakeGap {
 
 /// Unit 17 with ten registers of value 0x1111.
 struct Bench {
-    line: Line<FakeUart, FakeGap>,
+    line: Line<FakeUart, FakeGap, FastUnit>,
     server: Server,
     registers: [u16; 10],
 }
@@ -194,7 +194,10 @@ const WINDOWS: Windows = Windows {
 impl Bench {
     fn new() -> Self {
         let adus = Box::leak(Box::new([Adu::new(), Adu::new()]));
-        let units = units(Some(17), true).expect("an address");
+        let units = FastUnit {
+            unit: 17,
+            is_fast: true,
+        };
         let port = Port::new(Receiver::rtu(units, false), adus);
         let (uart, gap) = (FakeUart::default(), FakeGap::default());
         let mut bench = Self {

@@ -31,7 +31,7 @@ pub(crate) enum Source {
 }
 
 /// The state of the links to the outputs of a slot.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Outputs {
     /// Level links.
     levels: u8,
@@ -258,7 +258,7 @@ impl Outputs {
     /// Returns the outputs that keep their present value over a reset: a link holds them, or a link held them before the
     /// start and has not decided yet.
     #[must_use]
-    pub const fn to_keep(&self) -> u8 {
+    pub const fn keeping(&self) -> u8 {
         self.kept
     }
 }

@@ -15,7 +15,7 @@ const SETTLED: u16 = 5;
 ///
 /// A code is implausible when it lies under the range, or shows an open or a short circuit. One over the range is
 /// plausible.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Plausible {
     /// Number of implausible codes since the input was good, at most [`CODES`].
     implausible: u16,

@@ -21,7 +21,7 @@ pub const AFTER_POWER_ON_MS: u16 = 1_000;
 pub const AFTER_A_FAULT_MS: u16 = 60_000;
 
 /// The inputs of a port. Masks have channel 1 in bit 0.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Sources {
     /// Time in ms until each has a value.
     waits: [u16; CHANNELS],

@@ -41,11 +41,13 @@ mod operation;
 mod saving;
 mod survey;
 
-use register_map::Board;
+use core::marker::PhantomData;
+
+use register_map::board::{Board, Each};
 use register_map::record::{Encoder, FIRST_OFFSET, Record, SCHEMA};
 
 use crate::config::Settings;
-use copied::{Copied, OF_OUTPUTS};
+use copied::Copied;
 pub use operation::Operation;
 use operation::{Readying, Writing};
 pub use ports::pages::{Page, Pages, WriteError};
@@ -58,9 +60,9 @@ const LITTLE_ROOM: usize = 256;
 
 /// The configuration that a start found.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Loaded<const SLOTS: usize> {
+pub struct Loaded<B: Board> {
     /// The stored settings, or the defaults.
-    pub settings: Settings<SLOTS>,
+    pub settings: Settings<B>,
     /// Something was stored but no record is valid: `settings` are the defaults.
     pub invalid: bool,
     /// Number of stored values that this board or firmware does not allow. They have their defaults instead.
@@ -76,31 +78,29 @@ struct Newest {
 
 /// The state of the two pages.
 #[derive(Clone, Debug)]
-pub struct Store {
+pub struct Store<B> {
     first: Survey,
     second: Survey,
+    board: PhantomData<B>,
 }
 
-impl Store {
+impl<B: Board> Store<B> {
     /// Examines both pages.
     #[must_use]
     pub fn open(flash: &impl Pages) -> Self {
         Self {
-            first: Survey::of(flash.page(Page::First)),
-            second: Survey::of(flash.page(Page::Second)),
+            first: Survey::of::<B>(flash.page(Page::First)),
+            second: Survey::of::<B>(flash.page(Page::Second)),
+            board: PhantomData,
         }
     }
 
     /// Returns the stored configuration, as far as this board allows it. [`Self::prepare`] uses the same record.
     #[must_use]
-    pub fn load<const SLOTS: usize>(
-        &mut self,
-        board: &'static Board,
-        flash: &impl Pages,
-    ) -> Loaded<SLOTS> {
+    pub fn load(&mut self, flash: &impl Pages) -> Loaded<B> {
         while let Some(Newest { page, place }) = self.newest() {
-            if let Some(record) = record_at(flash.page(page), place.offset) {
-                let (settings, rejected) = Settings::load(board, record.pairs());
+            if let Some(record) = record_at::<B>(flash.page(page), place.offset) {
+                let (settings, rejected) = Settings::load(record.pairs());
                 return Loaded {
                     settings,
                     invalid: false,
@@ -111,7 +111,7 @@ impl Store {
             self.survey_mut(page).newest = None;
         }
         Loaded {
-            settings: Settings::defaults(board),
+            settings: Settings::defaults(),
             invalid: self.first.written || self.second.written,
             rejected: 0,
         }
@@ -122,7 +122,7 @@ impl Store {
     #[must_use]
     pub fn outputs<'a>(&self, flash: &'a impl Pages) -> Option<Record<'a>> {
         let (page, offset) = self.newest_outputs()?;
-        record_at(flash.page(page), offset)
+        record_at::<B>(flash.page(page), offset)
     }
 
     /// Prepares the pages for saves. Call this at every start, before the line is served: it may take 120 ms for
@@ -203,10 +203,10 @@ impl Store {
         if survey.clean && (!survey.has_old_records() || survey.room() >= LITTLE_ROOM) {
             return Ok(());
         }
-        let Some(record) = record_at(flash.page(page), place.offset) else {
+        let Some(record) = record_at::<B>(flash.page(page), place.offset) else {
             return Ok(());
         };
-        let mut settings = Copied::settings(&record, page, place.offset);
+        let mut settings = Copied::settings::<B>(&record, page, place.offset);
         let mut outputs = self.stored_outputs(flash);
         let count = outputs.iter().fold(settings.count(), |count, outputs| {
             count.saturating_add(outputs.count())
@@ -288,12 +288,12 @@ impl Store {
     }
 
     /// Returns the stored outputs, to be copied.
-    fn stored_outputs(&self, flash: &impl Pages) -> [Copied; OF_OUTPUTS] {
-        [(); OF_OUTPUTS].map(|()| {
+    fn stored_outputs(&self, flash: &impl Pages) -> Each<B::Kept, Copied> {
+        Each::of(|_| {
             if let Some((page, offset)) = self.newest_outputs()
-                && let Some(record) = record_at(flash.page(page), offset)
+                && let Some(record) = record_at::<B>(flash.page(page), offset)
             {
-                Copied::outputs(&record, page, offset)
+                Copied::outputs::<B>(&record, page, offset)
             } else {
                 Copied::NOTHING
             }

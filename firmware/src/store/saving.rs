@@ -2,48 +2,48 @@
 
 use core::iter;
 
+use register_map::board::{Board, Each};
 use register_map::record::{Encoder, FIRST_OFFSET, OUTPUTS_SCHEMA, SCHEMA};
 
-use super::copied::{Copied, OF_OUTPUTS, is_setting};
+use super::copied::{Copied, is_setting};
 use super::operation::{Operation, Readying, Writing};
 use super::survey::record_at;
 use super::{Newest, Page, Pages, Store, WriteError};
-use crate::KEEPS_OUTPUTS;
 use crate::config::Settings;
 
 /// The values to store.
 #[derive(Clone, Copy, Debug)]
-pub enum Given<'a, const SLOTS: usize> {
+pub enum Given<'a, B: Board> {
     /// All settings.
-    Settings(&'a Settings<SLOTS>),
+    Settings(&'a Settings<B>),
     /// The outputs that are to start as they were, as pairs of a record.
     Outputs(&'a [(u16, u16)]),
 }
 
 /// A save or a record of outputs under way. Pass the same values to every step.
 #[derive(Clone, Debug)]
-pub struct Saving {
+pub struct Saving<B: Board> {
     readying: Readying,
     writing: Writing,
     /// Address after the setting that was stored last, or index of the next output.
     cursor: u16,
     /// The outputs that follow the settings of a save, or the settings in front of outputs.
-    copied: [Copied; OF_OUTPUTS],
+    copied: Each<B::Kept, Copied>,
 }
 
-impl Saving {
+impl<B: Board> Saving<B> {
     /// Begins a save of these settings. Returns `None` when they are already stored.
     #[must_use]
-    pub fn of_settings<const SLOTS: usize>(
-        store: &Store,
+    pub fn of_settings(
+        store: &Store<B>,
         flash: &impl Pages,
-        settings: &Settings<SLOTS>,
+        settings: &Settings<B>,
     ) -> Option<Self> {
         let newest = store.newest();
         let stored =
-            newest.and_then(|newest| record_at(flash.page(newest.page), newest.place.offset));
+            newest.and_then(|newest| record_at::<B>(flash.page(newest.page), newest.place.offset));
         if stored.is_some_and(|stored| {
-            let pairs = stored.pairs().filter(is_setting);
+            let pairs = stored.pairs().filter(is_setting::<B>);
             pairs.eq(settings.changed_from(0))
         }) {
             return None;
@@ -64,7 +64,11 @@ impl Saving {
     /// Begins a record of outputs: after the newest record if it fits there, or else on the other page together with the
     /// stored settings. Returns `None` when these outputs are already stored, and when no settings are or leave no room.
     #[must_use]
-    pub fn of_outputs(store: &Store, flash: &impl Pages, outputs: &[(u16, u16)]) -> Option<Self> {
+    pub fn of_outputs(
+        store: &Store<B>,
+        flash: &impl Pages,
+        outputs: &[(u16, u16)],
+    ) -> Option<Self> {
         let Newest {
             page,
             place: newest,
@@ -82,8 +86,8 @@ impl Saving {
         let survey = store.survey(page);
         let mut place = (page, survey.end, Readying::Done);
         if survey.room() < encoder.size() {
-            let record = record_at(flash.page(page), newest.offset)?;
-            *stored = Copied::settings(&record, page, newest.offset);
+            let record = record_at::<B>(flash.page(page), newest.offset)?;
+            *stored = Copied::settings::<B>(&record, page, newest.offset);
             let sequence = newest.sequence.wrapping_add(1);
             let count = count.saturating_add(stored.count());
             encoder = Encoder::new(record.schema, sequence, count);
@@ -96,10 +100,10 @@ impl Saving {
         Some(Self::new(place, encoder, copied))
     }
 
-    const fn new(
+    fn new(
         (page, offset, readying): (Page, usize, Readying),
         encoder: Encoder,
-        copied: [Copied; OF_OUTPUTS],
+        copied: Each<B::Kept, Copied>,
     ) -> Self {
         Self {
             readying,
@@ -110,11 +114,7 @@ impl Saving {
     }
 
     /// Returns the next operation, to be performed before the next call, or `None` when all are done.
-    pub fn next<const SLOTS: usize>(
-        &mut self,
-        flash: &impl Pages,
-        given: Given<'_, SLOTS>,
-    ) -> Option<Operation> {
+    pub fn next(&mut self, flash: &impl Pages, given: Given<'_, B>) -> Option<Operation> {
         if let Some(operation) = self.readying.next() {
             return Some(operation);
         }
@@ -123,7 +123,7 @@ impl Saving {
             let mut copied = copied.iter_mut();
             let mut copy = || copied.next()?.next(flash);
             match given {
-                Given::Outputs(outputs) if KEEPS_OUTPUTS => copy().or_else(|| {
+                Given::Outputs(outputs) if B::ROW.keeps_outputs => copy().or_else(|| {
                     let pair = outputs.get(usize::from(*cursor)).copied();
                     *cursor = cursor.saturating_add(1);
                     pair
@@ -147,7 +147,7 @@ impl Saving {
     /// When the record is not stored.
     pub fn finish<F: Pages>(
         &self,
-        store: &mut Store,
+        store: &mut Store<B>,
         flash: &F,
     ) -> Result<(), WriteError<F::Error>> {
         store.survey_again(flash);
@@ -163,7 +163,7 @@ impl Saving {
 
 /// Returns where a record of this size goes, and the steps that prepare the place: after the newest record, or else
 /// on the other page, which is erased only if the record does not fit there either.
-fn place(store: &Store, size: usize) -> (Page, usize, Readying) {
+fn place<B: Board>(store: &Store<B>, size: usize) -> (Page, usize, Readying) {
     let active = store.newest().map(|newest| newest.page);
     let first = active.unwrap_or(Page::First);
     for page in [first, first.other()] {

@@ -1,5 +1,6 @@
 //! The content of a page.
 
+use register_map::board::Board;
 use register_map::record::{
     FIRST_OFFSET, PAGE_MARK, Record, SEALS, is_newer, is_vacant, records, used,
 };
@@ -67,7 +68,7 @@ pub(super) struct Survey {
 }
 
 impl Survey {
-    pub(super) fn of(page: &[u8]) -> Self {
+    pub(super) fn of<B: Board>(page: &[u8]) -> Self {
         let used = used(page);
         let marked = page.first_chunk() == Some(&PAGE_MARK.to_le_bytes());
         let mut survey = Self {
@@ -81,12 +82,12 @@ impl Survey {
             size: page.len(),
             records: 0,
         };
-        for (offset, record) in records(page) {
+        for (offset, record) in records(page, B::ROW) {
             let place = Place::new(page, offset, record);
             survey.clean &= offset == survey.end && place.sealed == 2;
             survey.end = place.seals.saturating_add(SEALS);
             survey.records = survey.records.saturating_add(1);
-            if record.holds_outputs() {
+            if B::ROW.keeps_outputs && record.holds_outputs() {
                 // Without a seal, its CRC may read differently at the next start.
                 if place.sealed > 0 {
                     survey.outputs = Some(offset);
@@ -124,13 +125,14 @@ impl Survey {
 }
 
 /// Returns the record at an offset of a page, if it is valid.
-pub(super) fn record_at(page: &[u8], offset: usize) -> Option<Record<'_>> {
-    Record::decode(page.get(offset..)?)
+pub(super) fn record_at<B: Board>(page: &[u8], offset: usize) -> Option<Record<'_>> {
+    Record::decode(page.get(offset..)?, B::ROW)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use register_map::board::Modio08;
     use register_map::record::encode_page;
 
     const PAGE_SIZE: usize = 1024;
@@ -144,19 +146,19 @@ mod tests {
     #[test]
     fn a_page_is_ready_only_with_its_mark_and_without_other_content() {
         let mark = PAGE_MARK.to_le_bytes();
-        let ready = Survey::of(&page(&mark));
+        let ready = Survey::of::<Modio08>(&page(&mark));
         assert!(ready.is_ready() && !ready.written);
         assert_eq!((ready.end, ready.room()), (2, PAGE_SIZE - 2));
-        let erased = Survey::of(&page(&[]));
+        let erased = Survey::of::<Modio08>(&page(&[]));
         assert!(
             !erased.is_ready() && !erased.written,
             "without a mark the erase may have been incomplete"
         );
-        let half_marked = Survey::of(&page(&[mark[0], 0xFF]));
+        let half_marked = Survey::of::<Modio08>(&page(&[mark[0], 0xFF]));
         assert!(!half_marked.is_ready() && !half_marked.written);
         let mut last = page(&mark);
         last[PAGE_SIZE - 1] = 0xFE;
-        let spoilt = Survey::of(&last);
+        let spoilt = Survey::of::<Modio08>(&last);
         assert!(!spoilt.is_ready() && spoilt.written && spoilt.room() == 0);
     }
 
@@ -178,7 +180,7 @@ mod tests {
     #[test]
     fn unsealed_record_counts_only_when_no_record_is_sealed() {
         let newest = |bytes: [u8; PAGE_SIZE]| {
-            Survey::of(&bytes)
+            Survey::of::<Modio08>(&bytes)
                 .newest
                 .map(|place| (place.sequence, place.sealed))
         };
@@ -191,7 +193,7 @@ mod tests {
     #[test]
     fn no_record_is_added_to_a_page_with_an_incomplete_seal() {
         for unsealed in [0, 2, 4] {
-            let survey = Survey::of(&records_of(&[1, 2], unsealed));
+            let survey = Survey::of::<Modio08>(&records_of(&[1, 2], unsealed));
             assert_eq!(survey.clean, unsealed == 0, "{unsealed}");
             assert_eq!((survey.end, survey.records), (2 + 2 * 18, 2));
         }
@@ -201,9 +203,9 @@ mod tests {
     fn no_record_is_added_to_a_page_with_data_after_its_records() {
         let mut bytes = page(&[]);
         let size = encode_page(0, &[(0x0114, 1)], &mut bytes).unwrap();
-        assert!(Survey::of(&bytes).clean);
+        assert!(Survey::of::<Modio08>(&bytes).clean);
         bytes[size + 10] = 0;
-        let survey = Survey::of(&bytes);
+        let survey = Survey::of::<Modio08>(&bytes);
         assert!(!survey.clean && survey.newest.map(|place| place.offset) == Some(2));
     }
 
@@ -219,7 +221,7 @@ mod tests {
         put(100, u32::MAX);
         put(200, 1);
         put(300, 0);
-        let survey = Survey::of(&bytes);
+        let survey = Survey::of::<Modio08>(&bytes);
         let newest = survey.newest.map(|place| (place.offset, place.sequence));
         assert_eq!((newest, survey.records), (Some((200, 1)), 4));
     }

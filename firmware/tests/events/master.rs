@@ -8,7 +8,7 @@ use rand::RngExt;
 use crate::bus::Bus;
 
 /// Address of the first input of a unit.
-const FIRST: u16 = 16;
+const FIRST: u16 = 0;
 /// Time that a unit takes to start, in us.
 const START_US: f64 = 150_000.0;
 
@@ -90,7 +90,7 @@ impl Master {
     fn switch_on(&mut self, n: usize) {
         let address = self.bus.units[n].address;
         let request = [
-            address, 0x46, 0x18, 13, 15, 0, 0, 1, 0, 2, 0, 16, 4, 1, 1, 1, 1,
+            address, 0x46, 0x18, 13, 15, 0, 0, 1, 0, 2, 0, 0, 4, 1, 1, 1, 1,
         ];
         let expected = frame(&[address, 0x46, 0x18, 2, 0, 0b1111]);
         // The unit may be starting, and frames are damaged.

@@ -4,14 +4,12 @@ use std::collections::VecDeque;
 use std::mem::MaybeUninit;
 
 use firmware::config::{Config, LineName, Origin, Settings};
-use firmware::device::{Device, Fixed, Identity};
+use firmware::device::{Device, Identity};
 use modbus_server::fast::{self, Part};
 use modbus_server::line::{Arbitration, FastUnit, Faults, Framing, Port, Receiver, Windows};
 use modbus_server::{Adu, Server};
-use register_map::board::MODIO_02;
+use register_map::board::{MODIO_08, Modio08};
 use register_map::{Module, configuration};
-
-const DESCRIPTION: &Fixed = &Fixed::of(&MODIO_02);
 
 /// Silences of the line in us.
 #[derive(Clone, Copy)]
@@ -20,10 +18,10 @@ pub struct Times {
     pub t35: f64,
 }
 
-/// A modio-02 with a 4DI.
+/// A modio-08 with a 4DI in its first slot.
 pub struct Unit {
     pub address: u8,
-    device: &'static mut Device<1>,
+    device: &'static mut Device<Modio08>,
     server: Server,
     fast: fast::Unit,
     port: Port<'static, FastUnit>,
@@ -46,10 +44,10 @@ pub struct Unit {
 impl Unit {
     pub fn new(address: u8, place: f64, pace: f64, levels: u8, at: f64) -> Self {
         let modules = [(
-            configuration::module_of(MODIO_02.first_port),
+            configuration::module_of(MODIO_08.first_port),
             Module::Di4.code(),
         )];
-        let (settings, _) = Settings::load(&MODIO_02, modules.into_iter());
+        let (settings, _) = Settings::load(modules.into_iter());
         let serial_number = 0x0D00_0000 + u32::from(address);
         let identity = Identity {
             unit: address,
@@ -59,8 +57,8 @@ impl Unit {
         };
         // A restart leaks some kilobytes.
         let place_of_device = Box::leak(Box::new(MaybeUninit::uninit()));
-        let config = Config::new(&MODIO_02, settings, false);
-        let device = Device::new_in(place_of_device, config, identity, DESCRIPTION);
+        let config = Config::new(settings, false);
+        let device = Device::new_in(place_of_device, config, identity);
         let units = FastUnit {
             unit: address,
             is_fast: true,

@@ -14,12 +14,12 @@
 use std::collections::BTreeMap;
 
 use firmware::config::{Config, LineName, Settings};
-use firmware::device::{Device, Fixed, Identity};
+use firmware::device::{Device, Identity};
 use firmware::kept_outputs::{KeptOutputs, half_word_of};
 use modbus_server::line::{Faults, Framing, Port, Receiver};
 use modbus_server::{Adu, Server, crc};
 use modio_drivers::Channels;
-use register_map::board::MODIO_08;
+use register_map::board::Modio08;
 use register_map::{Module, configuration as at, links};
 use serde_json::Value;
 
@@ -39,7 +39,7 @@ const RESETS: [u8; 2] = [0b11_0000, 0b10_1000];
 
 /// A device and its server.
 struct Bench {
-    device: &'static mut Device<4>,
+    device: &'static mut Device<Modio08>,
     server: Server,
 }
 
@@ -48,7 +48,7 @@ impl Bench {
     fn new(reset_cause: u8, settings: &[(u16, u16)]) -> Self {
         let mut pairs: Vec<_> = at::modules(MODULES).collect();
         pairs.extend_from_slice(settings);
-        let (settings, rejected) = Settings::load(&MODIO_08, pairs.into_iter());
+        let (settings, rejected) = Settings::load(pairs.into_iter());
         assert_eq!(rejected, 0);
         let identity = Identity {
             unit: 1,
@@ -58,9 +58,8 @@ impl Bench {
         Self {
             device: Device::new_in(
                 Box::leak(Box::new_uninit()),
-                Config::new(&MODIO_08, settings, false),
+                Config::new(settings, false),
                 identity,
-                const { &Fixed::of(&MODIO_08) },
             ),
             server: Server::new(Framing::Rtu),
         }

@@ -2,7 +2,6 @@
 //! leave. The next start must find the complete old or new configuration, and later saves must work.
 
 use firmware::store::{Operation, Page, Pages, Store, WriteError};
-use register_map::board::MODIO_02;
 
 use crate::PAGE_SIZE;
 use crate::flash::{Fault, MESSES, Mess, MockFlash};
@@ -132,14 +131,14 @@ fn saves(sizes: impl IntoIterator<Item = usize>) -> Vec<Event> {
 fn cut_in_the_first_start_and_the_first_saves_is_recovered() {
     let mut life = saves([0, 1, 5]);
     life.push(Restart);
-    let cuts = cut_everywhere(MockFlash::erased(), &Settings::defaults(&MODIO_02), &life);
+    let cuts = cut_everywhere(MockFlash::erased(), &Settings::defaults(), &life);
     assert!(cuts > 4 + 7 + 3 * 7, "{cuts}");
 }
 
 #[test]
 fn cut_in_a_save_of_every_setting_is_recovered() {
     let life = [Save(Box::new(fullest_settings(1))), Restart];
-    let places = live(MockFlash::erased(), &Settings::defaults(&MODIO_02), &life);
+    let places = live(MockFlash::erased(), &Settings::defaults(), &life);
     assert!(places.len() > 400, "{}", places.len());
     for (index, place) in places.iter().enumerate() {
         some_messes(index).for_each(|mess| cut_and_recover(place, mess));
@@ -149,7 +148,7 @@ fn cut_in_a_save_of_every_setting_is_recovered() {
 #[test]
 fn cut_in_saves_that_fill_both_pages_without_a_restart_is_recovered() {
     let life = saves([60, 50, 40, 90, 100, 10, 80, 70, 60].repeat(2 * PAGES_OF_1_KIB));
-    let places = live(MockFlash::erased(), &Settings::defaults(&MODIO_02), &life);
+    let places = live(MockFlash::erased(), &Settings::defaults(), &life);
     let erases = places
         .iter()
         .filter(|place| matches!(place.operation, Operation::Erase(_)));
@@ -169,7 +168,7 @@ fn cut_in_an_erase_between_saves_is_recovered_and_saves_never_erase() {
     for save in saves([60, 50, 40, 90, 100, 10, 80, 70, 60].repeat(2 * PAGES_OF_1_KIB)) {
         life.extend([save, Spare]);
     }
-    let places = live(MockFlash::erased(), &Settings::defaults(&MODIO_02), &life);
+    let places = live(MockFlash::erased(), &Settings::defaults(), &life);
     let is_erase = |place: &&Place| matches!(place.operation, Operation::Erase(_));
     let (idle, saving): (Vec<_>, Vec<_>) = places
         .iter()
@@ -197,7 +196,7 @@ fn cut_in_the_compaction_and_the_erases_of_a_start_is_recovered() {
     life.push(Restart);
     life.extend(saves([25, 25]));
     life.push(Restart);
-    let places = live(MockFlash::erased(), &Settings::defaults(&MODIO_02), &life);
+    let places = live(MockFlash::erased(), &Settings::defaults(), &life);
     // Only a start compacts.
     let in_starts: Vec<_> = places
         .iter()
@@ -214,14 +213,14 @@ fn cut_in_the_compaction_and_the_erases_of_a_start_is_recovered() {
 #[test]
 fn cut_in_the_erase_before_the_very_first_record_is_recovered() {
     let half_marked = MockFlash::with(&[0x6F], &[0x6F]);
-    let places = live(half_marked, &Settings::defaults(&MODIO_02), &[]);
+    let places = live(half_marked, &Settings::defaults(), &[]);
     assert!(matches!(places[0].operation, Operation::Erase(_)));
     for place in places {
         let mut flash = place.before;
         flash.cut_in(place.operation, Mess::Complete);
         flash.power_on();
         let (loaded, _) = start_well(&mut flash);
-        assert!(loaded.settings == Settings::defaults(&MODIO_02) && !loaded.invalid);
+        assert!(loaded.settings == Settings::defaults() && !loaded.invalid);
     }
 }
 
@@ -230,7 +229,7 @@ fn cut_in_the_erase_before_the_very_first_record_is_recovered() {
 #[test]
 fn cut_in_the_start_after_a_cut_is_recovered() {
     let life = saves([2, 3]);
-    for place in live(MockFlash::erased(), &Settings::defaults(&MODIO_02), &life) {
+    for place in live(MockFlash::erased(), &Settings::defaults(), &life) {
         for (index, mess) in MESSES.into_iter().enumerate() {
             let mut flash = place.before.clone();
             flash.cut_in(place.operation, mess);
@@ -258,7 +257,7 @@ fn cut_in_a_half_word_that_then_reads_as_erased_only_at_the_start_is_recovered()
     let new = settings(&[(0x0141, 0x2222)]);
     let places = live(
         MockFlash::erased(),
-        &Settings::defaults(&MODIO_02),
+        &Settings::defaults(),
         &[Save(Box::new(old)), Save(Box::new(new))],
     );
     let first = places.iter().find(|place| place.old == old).unwrap();
@@ -275,7 +274,7 @@ fn cut_in_a_half_word_that_then_reads_as_erased_only_at_the_start_is_recovered()
             let _ = Pages::page(&flash, Page::First);
         }
         let mut store = Store::open(&flash);
-        let loaded = store.load(&MODIO_02, &flash);
+        let loaded = store.load(&flash);
         let _ = Pages::page(&flash, Page::First);
         store.prepare(&mut flash).unwrap();
         assert!(loaded.settings == old && !loaded.invalid, "{starts}");

@@ -2,10 +2,15 @@
 
 mod cuts;
 mod flash;
-mod outputs;
+#[expect(dead_code, reason = "the board keeps no outputs")]
 mod running;
 mod vectors;
 mod wear;
 
-/// Bytes of a page of the STM32F103CB.
-const PAGE_SIZE: usize = 1024;
+use register_map::board::Board;
+
+/// A board with one slot, whose pages have 1 KiB.
+type B = register_map::board::Modio02;
+
+/// Bytes of a page.
+const PAGE_SIZE: usize = B::ROW.store().bytes as usize;

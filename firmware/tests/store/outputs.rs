@@ -1,15 +1,15 @@
 //! Records of outputs among saves, with power cuts at every possible place.
 
-use firmware::store::{Operation, Store};
-use register_map::board::MODIO_02;
+use firmware::store::Operation;
+use register_map::board::Board;
 use register_map::record::{OUTPUTS, encode_page, records};
 
-use crate::PAGE_SIZE;
 use crate::flash::{MESSES, Mess, MockFlash};
 use crate::running::{
-    Loaded, Outputs, Settings, fullest_settings, outputs, random_settings, record, save, settings,
-    start_well, stored,
+    Loaded, Outputs, Settings, Store, fullest_settings, outputs, random_settings, record, save,
+    settings, start_well, stored,
 };
+use crate::{B, PAGE_SIZE};
 
 /// Settings and outputs.
 type State = (Settings, Outputs);
@@ -17,7 +17,7 @@ type State = (Settings, Outputs);
 /// Starts the device and returns what it finds.
 fn found(flash: &mut MockFlash) -> (State, Store) {
     let mut store = Store::open(flash);
-    let loaded: Loaded = store.load(&MODIO_02, flash);
+    let loaded: Loaded = store.load(flash);
     assert!(!loaded.invalid && loaded.rejected == 0);
     let first = stored(&store, flash);
     store.prepare(flash).unwrap();
@@ -162,7 +162,7 @@ fn record_of_stored_outputs_programs_nothing() {
     assert!(record(&mut store, &mut flash, &outputs(1)).unwrap());
     let before = flash.operations();
     assert!(!record(&mut store, &mut flash, &outputs(1)).unwrap());
-    let defaults = Settings::defaults(&MODIO_02);
+    let defaults = Settings::defaults();
     assert!(!save(&mut store, &mut flash, &defaults).unwrap());
     assert!(start_well(&mut flash).0.settings == defaults);
     assert_eq!(flash.operations(), before);
@@ -211,7 +211,7 @@ fn settings_that_only_a_later_firmware_knows_survive_records_and_starts() {
         }
     }
     assert!(flash.erases[0] > 0 && flash.erases[1] > 0);
-    let newest = flash.pages.iter().flat_map(|page| records(page));
+    let newest = flash.pages.iter().flat_map(|page| records(page, B::ROW));
     let newest = newest
         .filter(|(_, record)| !record.holds_outputs())
         .max_by_key(|(_, record)| record.sequence);
@@ -248,7 +248,7 @@ fn eighty_records_a_day_for_twenty_years_wear_a_page_as_documented() {
             let mut flash = MockFlash::erased();
             let (_, mut store) = found(&mut flash);
             let changed: Vec<_> = (0..changed).map(|n| (0x0160 + n, 2000)).collect();
-            let changed = Settings::load(&MODIO_02, changed.into_iter()).0;
+            let changed = Settings::load(changed.into_iter()).0;
             save(&mut store, &mut flash, &changed).unwrap();
             let rounds = 3_000;
             for round in 0..rounds {

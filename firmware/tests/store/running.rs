@@ -1,19 +1,21 @@
 //! The steps of a device's life that concern the store.
 
-use firmware::store::{Given, Saving, Store, WriteError};
-use register_map::board::MODIO_02;
+use firmware::store::{Given, Saving, WriteError};
+use register_map::board::Board;
 use register_map::configuration::{COMMAND, HEARTBEAT, KEY, RULES, module_of};
 use register_map::record::OUTPUTS;
 use register_map::{Module, Rule, deadband};
 
+use crate::B;
 use crate::flash::{Fault, MockFlash, Noise};
 
-/// The settings of a modio-02, and what a start finds.
-pub type Settings = firmware::config::Settings<1>;
-pub type Loaded = firmware::store::Loaded<1>;
+/// The settings, and what a start finds.
+pub type Settings = firmware::config::Settings<B>;
+pub type Loaded = firmware::store::Loaded<B>;
+pub type Store = firmware::store::Store<B>;
 
-/// MODULE of the board's port.
-const MODULE_SLOT: u16 = module_of(5);
+/// MODULE of the first slot.
+pub const MODULE_SLOT: u16 = module_of(B::ROW.first_port);
 
 /// Values of outputs, as pairs of a record.
 pub type Outputs = Vec<(u16, u16)>;
@@ -23,7 +25,7 @@ pub type Failure = WriteError<Fault>;
 /// Starts the device: loads the configuration and prepares the store.
 pub fn start(flash: &mut MockFlash) -> (Loaded, Result<Store, Failure>) {
     let mut store = Store::open(flash);
-    let loaded = store.load(&MODIO_02, flash);
+    let loaded = store.load(flash);
     let prepared = store.prepare(flash);
     (loaded, prepared.map(|()| store))
 }
@@ -63,7 +65,7 @@ pub fn record(
     let Some(mut saving) = Saving::of_outputs(store, flash, outputs) else {
         return Ok(false);
     };
-    let given: Given<'_, 1> = Given::Outputs(outputs);
+    let given: Given<'_, B> = Given::Outputs(outputs);
     while let Some(operation) = saving.next(flash, given) {
         if let Err(failure) = operation.perform(flash) {
             let _ = saving.finish(store, flash);
@@ -88,7 +90,7 @@ pub fn outputs(round: u16) -> Outputs {
 }
 
 pub fn settings(pairs: &[(u16, u16)]) -> Settings {
-    let (settings, rejected) = Settings::load(&MODIO_02, pairs.iter().copied());
+    let (settings, rejected) = Settings::load(pairs.iter().copied());
     assert_eq!(rejected, 0, "{pairs:?}");
     settings
 }
@@ -105,7 +107,7 @@ pub fn random_settings(seed: u64, changed: usize) -> Settings {
             pairs.extend(some_value(rule, &mut noise).map(|value| (address, value)));
         }
     }
-    Settings::load(&MODIO_02, pairs.into_iter()).0
+    Settings::load(pairs.into_iter()).0
 }
 
 /// Returns settings in which every value that can be changed differs from its default.
@@ -115,13 +117,14 @@ pub fn fullest_settings(seed: u64) -> Settings {
     for (rule, address) in addresses().filter(|(_, address)| *address != MODULE_SLOT) {
         pairs.extend(some_value(rule, &mut noise).map(|value| (address, value)));
     }
-    Settings::load(&MODIO_02, pairs.into_iter()).0
+    Settings::load(pairs.into_iter()).0
 }
 
-/// Returns the addresses of all settings that a board with one slot has, with their rules, in ascending order.
+/// Returns the addresses of all settings but links, with their rules, in ascending order.
 fn addresses() -> impl Iterator<Item = (&'static Rule, u16)> {
     let rules = RULES.iter().chain(deadband::RULES);
     rules
+        .filter(|rule| B::ROW.has(rule.first))
         .filter(|rule| ![KEY, COMMAND, HEARTBEAT].contains(&rule.first))
         .flat_map(|rule| rule.addresses().map(move |address| (rule, address)))
 }

@@ -4,8 +4,12 @@ mod cuts;
 mod flash;
 mod outputs;
 mod running;
-mod vectors;
 mod wear;
 
-/// Bytes of a page of the STM32F103RC.
-const PAGE_SIZE: usize = 2048;
+use register_map::board::Board;
+
+/// A board with four slots, DEADBAND and START = as it was, whose pages have 2 KiB.
+type B = register_map::board::Modio08;
+
+/// Bytes of a page.
+const PAGE_SIZE: usize = B::ROW.store().bytes as usize;

@@ -2,13 +2,14 @@
 
 use firmware::store::{Given, Page, Saving, Store};
 use register_map::Module;
-use register_map::board::MODIO_02;
 use register_map::configuration::modules;
 use register_map::record::{SEALS, encode_page, records};
 
-use crate::PAGE_SIZE;
+use register_map::board::Board;
+
 use crate::flash::MockFlash;
 use crate::running::{Settings, save, settings, start_well};
+use crate::{B, PAGE_SIZE};
 
 /// Written by version 0.1: page mark, then two records, the second with another baud rate. The CRCs were computed
 /// by Python's zlib.crc32.
@@ -115,11 +116,11 @@ fn a_start_keeps_what_only_a_later_firmware_knows() {
     let mut bytes = page(&LATER);
     bytes[600] = 0; // left by a cut: the record must move
     let mut flash = MockFlash::holding([bytes, [0xFF; PAGE_SIZE]]);
-    let before = records(&bytes).next().unwrap().1;
+    let before = records(&bytes, B::ROW).next().unwrap().1;
     start_well(&mut flash);
-    let (_, moved) = records(&flash.pages[1]).next().unwrap();
+    let (_, moved) = records(&flash.pages[1], B::ROW).next().unwrap();
     assert!(moved.pairs().eq(before.pairs()) && moved.schema == before.schema);
-    assert_eq!(records(&flash.pages[0]).count(), 0);
+    assert_eq!(records(&flash.pages[0], B::ROW).count(), 0);
 }
 
 #[test]
@@ -144,11 +145,11 @@ fn another_layout_is_reported_and_kept_until_something_is_saved() {
     let mut flash = MockFlash::holding([bytes, [0xFF; PAGE_SIZE]]);
     for _ in 0..3 {
         let (loaded, _) = start_well(&mut flash);
-        assert!(loaded.invalid && loaded.settings == Settings::defaults(&MODIO_02));
+        assert!(loaded.invalid && loaded.settings == Settings::defaults());
         assert_eq!(flash.pages[0], bytes, "the page is kept as evidence");
     }
     let (_, mut store) = start_well(&mut flash);
-    assert!(save(&mut store, &mut flash, &Settings::defaults(&MODIO_02)).unwrap());
+    assert!(save(&mut store, &mut flash, &Settings::defaults()).unwrap());
     assert!(!start_well(&mut flash).0.invalid);
 }
 
@@ -178,5 +179,5 @@ fn what_is_stored_is_the_documented_record() {
     saving.finish(&mut store, &flash).unwrap();
     let bytes = firmware::store::Pages::page(&flash, Page::First);
     assert_eq!(bytes[..SEALED.len()], SEALED);
-    assert!(Store::open(&flash).load(&MODIO_02, &flash).settings == settings);
+    assert!(Store::open(&flash).load(&flash).settings == settings);
 }

@@ -1,7 +1,6 @@
 //! The wear of the flash, and the behaviour when the flash is worn out.
 
 use firmware::store::{Page, WriteError};
-use register_map::board::MODIO_02;
 
 use crate::flash::{MockFlash, Noise};
 use crate::running::{
@@ -13,7 +12,7 @@ fn saving_what_is_stored_programs_nothing() {
     let mut flash = MockFlash::erased();
     let (_, mut store) = start_well(&mut flash);
     let before = flash.operations();
-    assert!(!save(&mut store, &mut flash, &Settings::defaults(&MODIO_02)).unwrap());
+    assert!(!save(&mut store, &mut flash, &Settings::defaults()).unwrap());
     let settings = random_settings(1, 30);
     assert!(save(&mut store, &mut flash, &settings).unwrap());
     let after = flash.operations();
@@ -77,7 +76,7 @@ fn garbage_gives_the_defaults_and_is_reported_until_something_is_saved() {
         }
         for _ in 0..2 {
             let (loaded, _) = start_well(&mut flash);
-            assert!(loaded.invalid && loaded.settings == Settings::defaults(&MODIO_02));
+            assert!(loaded.invalid && loaded.settings == Settings::defaults());
         }
         let (_, mut store) = start_well(&mut flash);
         let settings = random_settings(seed, 9);
@@ -104,7 +103,7 @@ fn a_worn_half_word_fails_a_save_and_keeps_the_stored_configuration() {
                     failures += 1;
                     assert_eq!(error, WriteError::Worn);
                     // The record already counts when the second seal is programmed.
-                    let stored = store.load(&MODIO_02, &flash).settings;
+                    let stored = store.load(&flash).settings;
                     assert!(stored == old || stored == new);
                     save(&mut store, &mut flash, &new).expect("elsewhere");
                 }

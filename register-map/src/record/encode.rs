@@ -117,6 +117,7 @@ mod tests {
     use std::vec::Vec;
 
     use super::*;
+    use crate::board::MODIO_08;
     use crate::record::records;
     use crate::{Module, configuration};
 
@@ -142,7 +143,7 @@ mod tests {
         let mut page = [0xFF; 100];
         let pairs: Vec<_> = configuration::modules((1_u16..).zip(modules)).collect();
         encode_page(0, &pairs, &mut page).unwrap();
-        let found: Vec<_> = records(&page).collect();
+        let found: Vec<_> = records(&page, &MODIO_08).collect();
         let [(FIRST_OFFSET, record)] = found[..] else {
             panic!("{found:?}");
         };

@@ -45,6 +45,7 @@
 
 mod encode;
 
+use crate::board::Row;
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 
 pub use encode::{BEGINNING, Encoder, encode_page};
@@ -70,9 +71,6 @@ pub const OUTPUTS: u16 = 0xE000;
 /// Bit of the address of a pair of digital outputs.
 pub const BITS: u16 = 0x80;
 
-/// Newest layout that is known: that of [`OUTPUTS_SCHEMA`], where the firmware keeps outputs.
-const LAYOUTS: u16 = if cfg!(feature = "small") { 1 } else { 2 };
-
 /// Bytes of a record without its pairs and seals.
 pub const OVERHEAD: usize = HEAD + 4;
 
@@ -95,14 +93,15 @@ pub struct Record<'a> {
 }
 
 impl<'a> Record<'a> {
-    /// Returns the record at the start of `bytes`, or `None` when there is none, or it is not valid or has an
-    /// unknown layout.
+    /// Returns the record at the start of `bytes`, or `None` when there is none, or it is not valid or has a layout that
+    /// is unknown on this board: one that keeps no outputs does not know that of [`OUTPUTS_SCHEMA`].
     #[must_use]
-    pub fn decode(bytes: &'a [u8]) -> Option<Self> {
+    pub fn decode(bytes: &'a [u8], board: &Row) -> Option<Self> {
         let (head, rest) = bytes.split_first_chunk::<HEAD>()?;
         let [m0, m1, s0, s1, q0, q1, q2, q3, n0, n1] = *head;
         let schema = u16::from_le_bytes([s0, s1]);
-        if u16::from_le_bytes([m0, m1]) != MARK || !(1..=LAYOUTS).contains(&(schema >> 8)) {
+        let newest = if board.keeps_outputs { 2 } else { 1 };
+        if u16::from_le_bytes([m0, m1]) != MARK || !(1..=newest).contains(&(schema >> 8)) {
             return None;
         }
         let count = usize::from(u16::from_le_bytes([n0, n1]));
@@ -121,7 +120,7 @@ impl<'a> Record<'a> {
     /// Returns whether this is a record of outputs alone.
     #[must_use]
     pub const fn holds_outputs(&self) -> bool {
-        LAYOUTS > 1 && self.schema >> 8 == OUTPUTS_SCHEMA >> 8
+        self.schema >> 8 == OUTPUTS_SCHEMA >> 8
     }
 
     /// Returns the bytes of the record without its seals.
@@ -175,14 +174,14 @@ pub fn used(page: &[u8]) -> usize {
 }
 
 /// Iterates over every valid record of a page with its offset, skipping anything between them.
-pub fn records(page: &[u8]) -> impl Iterator<Item = (usize, Record<'_>)> {
+pub fn records<'a>(page: &'a [u8], board: &Row) -> impl Iterator<Item = (usize, Record<'a>)> {
     let mut offset = 0;
     let end = used(page);
     core::iter::from_fn(move || {
         while offset < end {
             let here = offset;
             let bytes = page.get(offset..)?;
-            if let Some(record) = Record::decode(bytes) {
+            if let Some(record) = Record::decode(bytes, board) {
                 offset = offset.saturating_add(record.size());
                 return Some((here, record));
             }
@@ -210,6 +209,7 @@ mod tests {
     use std::vec::Vec;
 
     use super::*;
+    use crate::board::MODIO_08;
 
     const PAGE_SIZE: usize = 1024;
 
@@ -223,7 +223,7 @@ mod tests {
     fn an_encoded_record_is_decoded() {
         let pairs = [(0x0101, 1152), (0x01C0, 0xFFFF), (0xFFFF, 0)];
         let bytes = encoded(0xFFFF_FFFF, &pairs);
-        let record = Record::decode(&bytes).unwrap();
+        let record = Record::decode(&bytes, &MODIO_08).unwrap();
         assert!(record.pairs().eq(pairs));
         assert_eq!(record.pair(1), Some(pairs[1]));
         assert_eq!(record.pair(3), None);
@@ -237,10 +237,14 @@ mod tests {
         for bit in 0..bytes.len() * 8 {
             let mut wrong = bytes.clone();
             wrong[bit / 8] ^= 1 << (bit % 8);
-            assert_eq!(Record::decode(&wrong), None, "bit {bit}");
+            assert_eq!(Record::decode(&wrong, &MODIO_08), None, "bit {bit}");
         }
         for len in 0..bytes.len() {
-            assert_eq!(Record::decode(&bytes[..len]), None, "{len} bytes");
+            assert_eq!(
+                Record::decode(&bytes[..len], &MODIO_08),
+                None,
+                "{len} bytes"
+            );
         }
     }
 
@@ -251,7 +255,7 @@ mod tests {
             let bytes: Vec<u8> = std::iter::from_fn(|| encoder.next(&mut || None))
                 .flat_map(u16::to_le_bytes)
                 .collect();
-            let record = Record::decode(&bytes)?;
+            let record = Record::decode(&bytes, &MODIO_08)?;
             assert_eq!(record.schema, schema);
             Some(record.holds_outputs())
         };
@@ -316,10 +320,10 @@ mod tests {
             &one[2..],
         ]
         .concat();
-        let found: Vec<_> = records(&page)
+        let found: Vec<_> = records(&page, &MODIO_08)
             .map(|(offset, record)| (offset, record.sequence))
             .collect();
         assert_eq!(found, [(4, 1), (4 + one.len() + 2, 2)]);
-        assert_eq!(records(&[0xFF; PAGE_SIZE]).count(), 0);
+        assert_eq!(records(&[0xFF; PAGE_SIZE], &MODIO_08).count(), 0);
     }
 }

@@ -104,7 +104,7 @@ fn pins_are_those_of_the_board() {
 fn commands_know_the_memory_of_the_board() {
     for board in MODIO {
         let (layout, ram) = (board.layout(), board.memory().part.ram);
-        let (store, plain) = (layout.store.first, board.store.first);
+        let (store, plain) = (layout.store.first, board.store().first);
         let bytes = 2 * layout.store.bytes;
         let memory = format!(
             "        \"ram\": 0x{ram:X},\n        \"store\": (0x{store:08X}, 0x{plain:08X}, {bytes}),\n"

@@ -6,8 +6,8 @@ use std::vec::Vec;
 use super::*;
 
 /// The settings of a modio-02.
-type Settings = super::Settings<1>;
-use register_map::board::{MODIO_02, MODIO_08};
+type Settings = super::Settings<Modio02>;
+use register_map::board::{Modio02, Modio08, Row};
 use register_map::configuration::{
     BAUD, FILTER, HEARTBEAT, HOLD, LORA_ADDRESS, RANGE, SAFE, START, module_of,
 };
@@ -22,12 +22,12 @@ fn changed(settings: &Settings) -> Vec<(u16, u16)> {
 }
 
 fn loaded(pairs: &[(u16, u16)]) -> (Settings, u16) {
-    Settings::load(&MODIO_02, pairs.iter().copied())
+    Settings::load(pairs.iter().copied())
 }
 
 #[test]
 fn defaults_are_the_factory_settings_and_count_as_unchanged() {
-    let settings = Settings::defaults(&MODIO_02);
+    let settings = Settings::defaults();
     assert_eq!((settings.get(BAUD), settings.get(FILTER + SLOT)), (96, 5));
     assert_eq!((settings.get(0x0145), settings.get(0x017F)), (300, 3950));
     assert_eq!((settings.get(0x0201), settings.get(0x0001)), (0, 0));
@@ -38,7 +38,7 @@ fn defaults_are_the_factory_settings_and_count_as_unchanged() {
 
 #[test]
 fn the_record_of_all_settings_fits_in_a_page() {
-    for board in Board::ALL {
+    for board in Row::ALL {
         // Settings of points that the board does not have keep their defaults.
         let of_points = board.slots * points::CHANNELS;
         let counts = RULES.iter().map(|rule| match rule.count {
@@ -53,7 +53,7 @@ fn the_record_of_all_settings_fits_in_a_page() {
         };
         let pairs = settings + slots * points::CHANNELS * links::EACH * links::WORDS;
         let size = FIRST_OFFSET + OVERHEAD + 4 * usize::from(pairs);
-        assert!(size <= board.store.bytes as usize, "{board}: {size}");
+        assert!(size <= board.store().bytes as usize, "{board}: {size}");
     }
 }
 
@@ -110,15 +110,13 @@ fn a_value_not_allowed_is_counted_and_an_unknown_address_is_ignored() {
 #[test]
 fn modules_are_accepted_only_on_ports_with_a_slot() {
     let pairs = (1..=8).map(|port| (module_of(port), 2));
-    let ports = |board| {
-        let (settings, rejected) = super::Settings::<4>::load(board, pairs.clone());
-        let ports: Vec<_> = (1..=8)
-            .filter(|port| settings.module(*port) == Module::Do4)
-            .collect();
-        (ports, rejected)
-    };
-    assert_eq!(ports(&MODIO_02), (std::vec![5], 7));
-    assert_eq!(ports(&MODIO_08), (std::vec![1, 2, 3, 4], 4));
+    fn ports<B: Board>(pairs: impl Iterator<Item = (u16, u16)>) -> (Vec<u16>, u16) {
+        let (settings, rejected) = super::Settings::<B>::load(pairs);
+        let ports = (1..=8).filter(|port| settings.module(*port) == Module::Do4);
+        (ports.collect(), rejected)
+    }
+    assert_eq!(ports::<Modio02>(pairs.clone()), (std::vec![5], 7));
+    assert_eq!(ports::<Modio08>(pairs), (std::vec![1, 2, 3, 4], 4));
 }
 
 #[test]
@@ -152,7 +150,7 @@ fn another_module_starts_from_its_own_defaults() {
 
 #[test]
 fn settings_made_before_the_module_are_kept_if_it_allows_them() {
-    let mut settings = Settings::defaults(&MODIO_02);
+    let mut settings = Settings::defaults();
     settings.set(SAFE + SLOT, 2048);
     settings.set(SAFE + SLOT + 1, HOLD);
     settings.set(FILTER + SLOT, 3);
@@ -164,4 +162,35 @@ fn settings_made_before_the_module_are_kept_if_it_allows_them() {
     settings.set(MODULE_SLOT, 4);
     let filters: Vec<_> = (0..4).map(|i| settings.get(FILTER + SLOT + i)).collect();
     assert_eq!(filters, [3, 4, 4, 4]);
+}
+
+register_map::on_boards! {
+    each_changed_setting_is_in_the_record: Modio02, Modio08, Fx3u14, Fx3u24, EthIo5r
+}
+
+fn each_changed_setting_is_in_the_record<B: Board>() {
+    let modules = B::ROW
+        .ports()
+        .map(|port| (module_of(port), Module::Di4.code()));
+    let modules = modules.filter(|_| B::ROW.is_modular());
+    let registers = B::ROW.registers().flat_map(|(rule, _)| {
+        // For every point another value than the default.
+        let other = |value: &u16| *value != rule.default && rule.values.allow(*value);
+        let value = (0..=u16::MAX).find(other);
+        rule.addresses().zip(core::iter::repeat(value))
+    });
+    let settings = registers.filter_map(|(address, value)| Some((address, value?)));
+    let settings = settings.filter(|(address, _)| {
+        is_held::<B>(*address) && is_setting(*address) && port_of(*address).is_none()
+    });
+    let (settings, _) = super::Settings::<B>::load(modules.chain(settings));
+    let changed: Vec<_> = settings.changed_from(0).collect();
+    let deadbands = if B::ROW.events { points::COUNT } else { 0 };
+    let has = changed
+        .iter()
+        .filter(|(address, _)| deadband::contain(*address));
+    assert_eq!(has.count(), usize::from(deadbands));
+    let (stored, rejected) = super::Settings::<B>::load(changed.into_iter());
+    assert_eq!((stored, rejected), (settings, 0));
+    assert_ne!(stored, super::Settings::<B>::defaults());
 }

@@ -1,25 +1,21 @@
 //! Boards whose inputs and outputs are fixed, without a switch and a radio.
 
 use super::*;
-use register_map::Board;
-use register_map::board::{ETH_IO5R, FX3U_14, FX3U_24};
+use register_map::board::{ETH_IO5R, EthIo5r, Fx3u14, Fx3u24};
 use register_map::points::Kind;
 
 /// A configuration of a board with its lock open.
-fn on<const SLOTS: usize>(
-    board: &'static Board,
-    stored: &[(u16, u16)],
-) -> super::super::Config<SLOTS> {
-    let (settings, rejected) = Settings::load(board, stored.iter().copied());
+pub(super) fn on<B: Board>(stored: &[(u16, u16)]) -> super::super::Config<B> {
+    let (settings, rejected) = Settings::load(stored.iter().copied());
     assert_eq!(rejected, 0);
-    let mut config = super::super::Config::new(board, settings, false);
+    let mut config = super::super::Config::new(settings, false);
     assert_eq!(write(&mut config, KEY, &[OPENING_KEY]), DONE);
     config
 }
 
 #[test]
 fn modules_are_those_of_the_board_and_cannot_be_written() {
-    let mut config = on::<7>(&FX3U_14, &[]);
+    let mut config = on::<Fx3u14>(&[]);
     assert_eq!(read(&config, MODULE, 8).unwrap(), [1, 1, 2, 2, 4, 4, 5, 0]);
     for port in 1..=8 {
         let own = read(&config, module_of(port), 1).unwrap();
@@ -34,7 +30,7 @@ fn modules_are_those_of_the_board_and_cannot_be_written() {
 
 #[test]
 fn last_port_of_the_fx3u_24_is_of_one_kind_or_the_other() {
-    let mut config = on::<8>(&FX3U_24, &[]);
+    let mut config = on::<Fx3u24>(&[]);
     assert_eq!(read(&config, MODULE, 8).unwrap(), [1, 1, 1, 1, 2, 2, 2, 4]);
     for (code, result) in [(0, VALUE), (5, VALUE), (1, VALUE), (6, DONE)] {
         assert_eq!(write(&mut config, module_of(8), &[code]), result, "{code}");
@@ -44,13 +40,13 @@ fn last_port_of_the_fx3u_24_is_of_one_kind_or_the_other() {
     assert_eq!(read(&config, RANGE + 28, 4).unwrap(), [0; 4]);
     assert_eq!(write(&mut config, module_of(8), &[4]), DONE);
     assert_eq!(read(&config, RANGE + 28, 4).unwrap(), [0, 0, 0, 1]);
-    let stored = on::<8>(&FX3U_24, &[(module_of(8), 6)]);
+    let stored = on::<Fx3u24>(&[(module_of(8), 6)]);
     assert_eq!(stored.modules()[7], Module::Ai2Ao2);
 }
 
 #[test]
 fn ranges_of_analog_points_are_those_of_the_board() {
-    let mut config = on::<7>(&FX3U_14, &[]);
+    let mut config = on::<Fx3u14>(&[]);
     let own = [0, 0, 0, 1, 1, 1, 0, 0, 0, 0];
     assert_eq!(read(&config, RANGE + 16, 10).unwrap(), own);
     assert_eq!(write(&mut config, RANGE + 16, &own), DONE);
@@ -66,13 +62,13 @@ fn ranges_of_analog_points_are_those_of_the_board() {
     config.load_defaults();
     assert_eq!(read(&config, RANGE + 16, 10).unwrap(), own);
     let pairs = [(RANGE + 19, 0), (module_of(5), 5)];
-    let (settings, rejected) = Settings::<7>::load(&FX3U_14, pairs.into_iter());
-    assert_eq!((settings, rejected), (Settings::defaults(&FX3U_14), 2));
+    let (settings, rejected) = Settings::<Fx3u14>::load(pairs.into_iter());
+    assert_eq!((settings, rejected), (Settings::defaults(), 2));
 }
 
 #[test]
 fn missing_channels_of_a_port_are_no_points() {
-    let settings = Settings::<4>::defaults(&ETH_IO5R);
+    let settings = Settings::<EthIo5r>::defaults();
     let kinds: Vec<_> = ETH_IO5R
         .points()
         .map(|point| settings.kind(point))
@@ -88,7 +84,7 @@ fn missing_channels_of_a_port_are_no_points() {
 
 #[test]
 fn unit_exists_without_a_switch_and_lora_with_a_radio() {
-    let mut config = on::<4>(&ETH_IO5R, &[]);
+    let mut config = on::<EthIo5r>(&[]);
     assert_eq!(read(&config, UNIT, 2).unwrap(), [1, 0]);
     assert_eq!(write(&mut config, UNIT, &[0]), VALUE);
     assert_eq!(write(&mut config, UNIT, &[248]), VALUE);
@@ -101,7 +97,7 @@ fn unit_exists_without_a_switch_and_lora_with_a_radio() {
         read(&config, FILTER + 30, 3),
         Err(Exception::IllegalDataAddress)
     );
-    let mut slots = on::<1>(&MODIO_02, &[]);
+    let mut slots = on::<Modio02>(&[]);
     assert_eq!(write(&mut slots, UNIT, &[5]), ADDRESS);
     assert_eq!(
         read(&slots, COMM_SOURCE, 3),
@@ -111,7 +107,7 @@ fn unit_exists_without_a_switch_and_lora_with_a_radio() {
 
 #[test]
 fn heartbeat_in_a_request_with_a_save_is_no_change_that_costs_one() {
-    let mut config = on::<4>(&ETH_IO5R, &[]);
+    let mut config = on::<EthIo5r>(&[]);
     config.set_saves_left(0);
     assert_eq!(write(&mut config, KEY, &[OPENING_KEY]), DONE);
     // COMMAND to HEARTBEAT.
@@ -121,7 +117,7 @@ fn heartbeat_in_a_request_with_a_save_is_no_change_that_costs_one() {
 
 #[test]
 fn address_is_written_by_serial_number_and_stored_alone() {
-    let mut config = on::<4>(&ETH_IO5R, &[]);
+    let mut config = on::<EthIo5r>(&[]);
     assert_eq!(
         config.check_unit(Some(5)),
         Err(Exception::IllegalDataAddress),
@@ -165,7 +161,7 @@ fn address_is_written_by_serial_number_and_stored_alone() {
 
 #[test]
 fn address_in_force_by_serial_number_needs_no_restart_although_it_was_saved_before() {
-    let mut config = on::<4>(&ETH_IO5R, &[]);
+    let mut config = on::<EthIo5r>(&[]);
     assert_eq!(write(&mut config, UNIT, &[5]), DONE);
     config.compare();
     config.begin_save();

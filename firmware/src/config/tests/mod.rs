@@ -12,7 +12,7 @@ use std::vec::Vec;
 
 use super::*;
 use register_map::Module;
-use register_map::board::{MODIO_02, MODIO_08};
+use register_map::board::{Modio02, Modio08};
 use register_map::codes::{Format, Scale, Signal};
 use register_map::configuration::*;
 use register_map::points;
@@ -23,14 +23,14 @@ const LOCKED: Result<Option<Command>, Exception> = Err(Exception::ServerDeviceBu
 const DONE: Result<Option<Command>, Exception> = Ok(None);
 
 /// The configuration on the board with one slot, port 5.
-type Config = super::Config<1>;
+type Config = super::Config<Modio02>;
 
 const SLOT: u16 = points::first(5);
 const MODULE_SLOT: u16 = module_of(5);
 
 /// Writes like the server: only when the check accepts the request.
-fn write<const SLOTS: usize>(
-    config: &mut super::Config<SLOTS>,
+fn write<B: Board>(
+    config: &mut super::Config<B>,
     start: u16,
     values: &[u16],
 ) -> Result<Option<Command>, Exception> {
@@ -45,8 +45,8 @@ fn write<const SLOTS: usize>(
     Ok(command)
 }
 
-fn read<const SLOTS: usize>(
-    config: &super::Config<SLOTS>,
+fn read<B: Board>(
+    config: &super::Config<B>,
     start: u16,
     count: u16,
 ) -> Result<Vec<u16>, Exception> {
@@ -71,9 +71,9 @@ fn all(config: &Config) -> Vec<u16> {
 }
 
 fn config(pairs: &[(u16, u16)]) -> Config {
-    let (settings, rejected) = Settings::load(&MODIO_02, pairs.iter().copied());
+    let (settings, rejected) = Settings::load(pairs.iter().copied());
     assert_eq!(rejected, 0);
-    Config::new(&MODIO_02, settings, false)
+    Config::new(settings, false)
 }
 
 fn unlocked(pairs: &[(u16, u16)]) -> Config {
@@ -246,7 +246,7 @@ fn settings_take_effect_immediately_or_after_the_restart() {
     assert_eq!((points[2].safe, points[3].safe), (None, Some(7)));
 
     save(&mut config);
-    let restarted = Config::new(&MODIO_02, *config.to_save(), false);
+    let restarted = Config::new(*config.to_save(), false);
     let line = LineConfig::of(&restarted.edited);
     assert_eq!(
         (line.baud, line.format, line.frame_gap),
@@ -324,7 +324,7 @@ fn unsaved_is_reported_until_the_save_is_complete_and_after_a_failure() {
     assert_eq!(write(&mut config, COMMAND, &[1]), Ok(Some(Command::Save)));
     config.begin_save();
     assert_eq!(status(&config), status::UNSAVED);
-    config.save_failed(Settings::defaults(&MODIO_02));
+    config.save_failed(Settings::defaults());
     assert_eq!(status(&config), status::UNSAVED);
     assert_eq!(read(&config, BETA, 1).unwrap(), [2000]);
     save(&mut config);
@@ -347,14 +347,7 @@ fn loading_defaults_and_dropping_changes_act_like_writes() {
     config.load_defaults();
     config.compare();
     assert_ne!(config.revision(), revision);
-    assert_eq!(
-        all(&config),
-        all(&Config::new(
-            &MODIO_02,
-            Settings::defaults(&MODIO_02),
-            false
-        ))
-    );
+    assert_eq!(all(&config), all(&Config::new(Settings::defaults(), false)));
     assert_eq!(status(&config), status::UNSAVED);
     config.drop_changes();
     config.compare();
@@ -382,11 +375,8 @@ fn every_command_is_returned_and_writing_it_changes_nothing() {
 #[test]
 fn an_invalid_store_is_reported() {
     assert_eq!(
-        Config::new(&MODIO_02, Settings::defaults(&MODIO_02), true).status(),
+        Config::new(Settings::defaults(), true).status(),
         status::STORED_INVALID
     );
-    assert_eq!(
-        Config::new(&MODIO_02, Settings::defaults(&MODIO_02), false).status(),
-        0
-    );
+    assert_eq!(Config::new(Settings::defaults(), false).status(), 0);
 }

@@ -54,9 +54,9 @@ fn every_slot_of_a_board_has_its_own_module_and_settings() {
         (module_of(4), 2),
         (START + 12, 1),
     ];
-    let (settings, rejected) = Settings::load(&MODIO_08, pairs.into_iter());
+    let (settings, rejected) = Settings::load(pairs.into_iter());
     assert_eq!(rejected, 0);
-    let mut config = crate::config::Config::<4>::new(&MODIO_08, settings, false);
+    let mut config = crate::config::Config::<Modio08>::new(settings, false);
     assert_eq!(
         *config.modules(),
         [Module::Di4, Module::Ai4, Module::None, Module::Do4]
@@ -121,6 +121,6 @@ fn settings_by_point_take_effect_together_with_their_module() {
     assert_eq!(write(&mut config, FILTER + SLOT, &[1000]), DONE);
     save(&mut config);
     assert_eq!(filter(&config), None);
-    let restarted = Config::new(&MODIO_02, *config.to_save(), false);
+    let restarted = Config::new(*config.to_save(), false);
     assert_eq!(filter(&restarted).unwrap(), 1000);
 }

@@ -1,7 +1,7 @@
 //! Which writes each line may make.
 
 use super::*;
-use register_map::board::FX3U_24;
+use register_map::board::Fx3u24;
 
 const OVER_THE_AIR: Origin = Origin {
     line: LineName::Second,
@@ -72,8 +72,8 @@ fn a_broadcast_over_the_air_writes_nothing_and_one_over_the_cable_does() {
 
 #[test]
 fn a_broadcast_over_rs232_writes_as_one_over_the_cable_does() {
-    let (settings, _) = Settings::load(&FX3U_24, [].into_iter());
-    let mut config = super::super::Config::<8>::new(&FX3U_24, settings, false);
+    let (settings, _) = Settings::load([].into_iter());
+    let mut config = super::super::Config::<Fx3u24>::new(settings, false);
     config.set_origin(broadcast(LineName::Second));
     assert_eq!(write(&mut config, KEY, &[OPENING_KEY]), DONE);
     assert_eq!(write(&mut config, BETA, &[2000]), DONE);

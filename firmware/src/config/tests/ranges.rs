@@ -19,10 +19,16 @@ fn ends(values: Values) -> (Vec<u16>, Vec<u16>) {
     (inside, outside)
 }
 
-#[test]
-fn every_setting_takes_the_ends_of_its_range_and_nothing_beyond() {
+register_map::on_boards! {
+    every_setting_takes_the_ends_of_its_range_and_nothing_beyond: Modio02, Modio08
+}
+
+fn every_setting_takes_the_ends_of_its_range_and_nothing_beyond<B: Board>() {
+    let slot = points::of_port(B::ROW.first_port);
+    let module_slot = module_of(B::ROW.first_port);
     let mut settings = Vec::new();
-    for rule in RULES
+    for rule in B::ROW
+        .rules()
         .iter()
         .filter(|rule| ![KEY, COMMAND, HEARTBEAT, UNIT].contains(&rule.first))
     {
@@ -34,14 +40,15 @@ fn every_setting_takes_the_ends_of_its_range_and_nothing_beyond() {
             let address = *address;
             // Seven data bits need ASCII mode.
             let mode = u16::from(address == FORMAT);
-            let mut config = unlocked(&[(MODULE_SLOT, module.code()), (MODE, mode)]);
-            let channel = point_of(address).and_then(|point| point.checked_sub(SLOT));
+            let mut config = fixed::on::<B>(&[(module_slot, module.code()), (MODE, mode)]);
+            let port = port_of(address);
+            let channel = point_of(address).and_then(|point| point.checked_sub(slot));
             let kind = channel.and_then(|channel| points.get(usize::from(channel)));
-            let is_port = (module_of(1)..=module_of(8)).contains(&address);
-            let (inside, outside) = ends(match is_port && address != MODULE_SLOT {
+            let (inside, outside) = ends(if port.is_some_and(|port| !B::ROW.has_slot(port)) {
                 // A port without a slot cannot have a module.
-                true => Values::only(0),
-                false => *rule.values_for(kind.copied().unwrap_or(Kind::None)),
+                Values::only(0)
+            } else {
+                *rule.values_for(kind.copied().unwrap_or(Kind::None))
             });
             for value in inside {
                 assert_eq!(

@@ -65,7 +65,7 @@ fn a_save_in_a_request_with_settings_counts_what_they_change() {
 
 #[test]
 fn a_save_after_an_invalid_store_needs_the_budget_until_it_is_complete() {
-    let mut config = Config::new(&MODIO_02, Settings::defaults(&MODIO_02), true);
+    let mut config = Config::new(Settings::defaults(), true);
     config.set_saves_left(0);
     assert_eq!(write(&mut config, KEY, &[OPENING_KEY]), DONE);
     assert_eq!(write(&mut config, COMMAND, &[1]), LOCKED);

@@ -14,7 +14,7 @@ fn uptime_counts_milliseconds_in_32_bits() {
 #[test]
 fn an_input_has_the_uptime_of_its_last_edge() {
     let modules = [Module::Di4, Module::Do4, Module::Relay2, Module::Ai4];
-    let mut bench = Bench::on(&MODIO_08, modules, &[]);
+    let mut bench = Bench::<Modio08>::on(modules, &[]);
     bench.scan_port(0, |channels| channels.set_bit(3, true));
     assert_eq!(
         bench.read(0x0380, 64).unwrap(),
@@ -43,7 +43,7 @@ fn an_input_has_the_uptime_of_its_last_edge() {
 #[test]
 fn file_3_is_the_log_of_edges() {
     let modules = [Module::None, Module::Di4, Module::None, Module::Di4];
-    let mut bench = Bench::on(&MODIO_08, modules, &[]);
+    let mut bench = Bench::<Modio08>::on(modules, &[]);
     let number = |bytes: &[u8]| u16::from_be_bytes([bytes[0], bytes[1]]);
     bench.scan_port(1, |_| {});
     bench.scan_port(3, |_| {});

@@ -12,8 +12,8 @@ const MODULES: [Module; 4] = [Module::Di4, Module::Ai4, Module::None, Module::No
 const INPUT: u16 = 4;
 
 /// Returns a device that reports its first analog input, which is 0.
-fn reporting(settings: &[(u16, u16)]) -> Bench<4> {
-    let mut bench = Bench::on(&MODIO_08, MODULES, settings);
+fn reporting(settings: &[(u16, u16)]) -> Bench<Modio08> {
+    let mut bench = Bench::<Modio08>::on(MODULES, settings);
     let device = &mut bench.device;
     let on = device
         .events
@@ -24,7 +24,7 @@ fn reporting(settings: &[(u16, u16)]) -> Bench<4> {
 }
 
 /// Sets the input. Returns whether this is an event.
-fn is_event(bench: &mut Bench<4>, value: u16) -> bool {
+fn is_event(bench: &mut Bench<Modio08>, value: u16) -> bool {
     let rest = bench.device.state.millis() % 100;
     bench.device.tick(100 - rest);
     bench.scan_port(1, |channels| channels.set_word(0, value));
@@ -35,13 +35,13 @@ fn is_event(bench: &mut Bench<4>, value: u16) -> bool {
 }
 
 /// Lets the unit report its events.
-fn fetch(bench: &mut Bench<4>) {
+fn fetch(bench: &mut Bench<Modio08>) {
     packet(bench);
     bench.device.sent();
 }
 
 /// Returns number, length and events of a packet that loses its arbitration.
-fn packet(bench: &mut Bench<4>) -> std::vec::Vec<u8> {
+fn packet(bench: &mut Bench<Modio08>) -> std::vec::Vec<u8> {
     let units = FastUnit {
         unit: 1,
         is_fast: true,
@@ -97,7 +97,7 @@ fn deadbands_are_settings_in_force_now_that_a_change_of_the_module_sets_to_0() {
         saved,
         [&modules[..], &[(DEADBAND + 4, 9), (DEADBAND + 5, 8)]].concat()
     );
-    let (loaded, rejected) = Settings::<4>::load(&MODIO_08, saved.into_iter());
+    let (loaded, rejected) = Settings::<Modio08>::load(saved.into_iter());
     assert_eq!((&loaded, rejected), (bench.device.config.to_save(), 0));
     bench.device.config.end_save(true);
     bench.write(at::MODULE + 1, &[6]).unwrap();
@@ -107,7 +107,7 @@ fn deadbands_are_settings_in_force_now_that_a_change_of_the_module_sets_to_0() {
 #[test]
 fn output_that_is_changed_by_less_than_the_deadband_is_reported() {
     let modules = [Module::Ao4, Module::None, Module::None, Module::None];
-    let mut bench = Bench::on(&MODIO_08, modules, &[]);
+    let mut bench = Bench::<Modio08>::on(modules, &[]);
     let device = &mut bench.device;
     let on = device
         .events
@@ -122,7 +122,7 @@ fn output_that_is_changed_by_less_than_the_deadband_is_reported() {
 
 #[test]
 fn edge_of_an_input_that_was_switched_off_is_not_reported() {
-    let mut bench = Bench::on(&MODIO_08, MODULES, &[]);
+    let mut bench = Bench::<Modio08>::on(MODULES, &[]);
     bench.scan(|channels| channels.set_bit(0, false));
     for setting in [Setting::Low, Setting::Off] {
         let device = &mut bench.device;
@@ -137,8 +137,8 @@ fn edge_of_an_input_that_was_switched_off_is_not_reported() {
 }
 
 /// Returns a device that reports its first two digital inputs, and has reported that they are open.
-fn with_two_inputs() -> Bench<4> {
-    let mut bench = Bench::on(&MODIO_08, MODULES, &[]);
+fn with_two_inputs() -> Bench<Modio08> {
+    let mut bench = Bench::<Modio08>::on(MODULES, &[]);
     bench.scan(|channels| (0..2).for_each(|n| channels.set_bit(n, false)));
     for input in 0..2 {
         let device = &mut bench.device;
@@ -204,4 +204,19 @@ fn states_follow_the_event_that_edges_were_lost() {
     }
     bench.device.sent();
     assert_eq!(bench.device.waiting().count, 0);
+}
+
+register_map::on_boards! {
+    board_without_events_has_no_registers_or_functions_of_them: Modio02, EthIo5r
+}
+
+fn board_without_events_has_no_registers_or_functions_of_them<B: Board>() {
+    let mut bench = Bench::<B>::on([], &[]);
+    bench.unlock();
+    assert_eq!(bench.read(DEADBAND, 1), Err(2));
+    assert_eq!(bench.write(DEADBAND, &[1]), Err(2));
+    let start = at::START + B::ROW.points().start;
+    assert_eq!(bench.write(start, &[at::AS_IT_WAS]), Err(3));
+    assert_eq!(bench.write(start, &[1]), Ok(()));
+    assert_eq!(bench.ask(&[70, 0x18, 0]), [70 | 0x80, 1]);
 }

@@ -2,7 +2,7 @@
 
 use super::*;
 
-impl<const SLOTS: usize> Bench<SLOTS> {
+impl<B: Board> Bench<B> {
     /// Reads records of a file in one request. Returns the exception, or the bytes of all groups.
     pub(super) fn read_file(&mut self, groups: &[(u16, u16, u16)]) -> Result<Vec<u8>, u8> {
         let mut pdu = std::vec![0x14, groups.len() as u8 * 7];
@@ -57,7 +57,7 @@ fn file_1_describes_the_unit_with_its_modules_in_force() {
 #[test]
 fn file_1_describes_all_slots_of_a_board() {
     let modules = [Module::Ai2Ao2, Module::None, Module::Di4, Module::Relay2];
-    let mut bench = Bench::on(&MODIO_08, modules, &[]);
+    let mut bench = Bench::<Modio08>::on(modules, &[]);
     let file = bench.self_description();
     let expected = modio_description::describe(&MODIO_08, env!("CARGO_PKG_VERSION"), |port| {
         modules[usize::from(port - 1)]

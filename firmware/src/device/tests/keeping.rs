@@ -14,15 +14,15 @@ const MODULES: [Module; 4] = [Module::Do4, Module::Relay2, Module::Ao4, Module::
 const POINTS: [u16; 6] = [0, 1, 3, 7, 8, 9];
 
 /// Returns a device whose stored settings let these outputs start as they were, together with these settings.
-fn keeping(settings: &[(u16, u16)]) -> Bench<4> {
+fn keeping(settings: &[(u16, u16)]) -> Bench<Modio08> {
     let starts = POINTS.map(|point| (at::START + point, AS_IT_WAS));
     let mut stored = settings.to_vec();
     stored.extend(starts);
     stored.sort_unstable();
-    Bench::on(&MODIO_08, MODULES, &stored)
+    Bench::<Modio08>::on(MODULES, &stored)
 }
 
-impl Bench<4> {
+impl Bench<Modio08> {
     fn set(&mut self, point: u8, on: bool) {
         assert_eq!(self.ask(&[5, 0, point, if on { 0xFF } else { 0 }, 0])[0], 5);
     }
@@ -36,7 +36,7 @@ impl Bench<4> {
     fn restored(self, outputs: &[(u16, u16)]) -> Self {
         let mut page = [0xFF; 200];
         encode_page(0, outputs, &mut page).unwrap();
-        let (_, record) = records(&page).next().unwrap();
+        let (_, record) = records(&page, &MODIO_08).next().unwrap();
         self.device.start_outputs(None, Some(&record));
         self
     }
@@ -151,7 +151,7 @@ fn an_edge_link_is_kept_a_pulse_and_an_output_that_a_link_always_holds_are_not()
 }
 
 /// Returns what a reset now keeps.
-fn kept(bench: &Bench<4>) -> KeptOutputs {
+fn kept(bench: &Bench<Modio08>) -> KeptOutputs {
     let mut values = [0; 32];
     for (slot, port) in bench.device.points.ports().iter().enumerate() {
         for channel in 0..4 {
@@ -209,7 +209,7 @@ fn reset_keeps_outputs_as_they_were_and_held_ones_and_no_others() {
     damaged.values[1] ^= 1;
     let mut page = [0xFF; 200];
     encode_page(0, &[(0xE280, 0x0203)], &mut page).unwrap();
-    let (_, record) = records(&page).next().unwrap();
+    let (_, record) = records(&page, &MODIO_08).next().unwrap();
     let mut next = keeping(&stored);
     next.device.start_outputs(Some(&damaged), Some(&record));
     assert_eq!(next.values().0, 0b0100_0110, "from the record");
@@ -228,7 +228,7 @@ fn values_are_stored_raw_and_start_in_the_unit_of_the_settings() {
 
 #[test]
 fn saved_settings_alone_decide_which_outputs_are_stored() {
-    let mut bench = Bench::on(&MODIO_08, MODULES, &[]);
+    let mut bench = Bench::<Modio08>::on(MODULES, &[]);
     bench.unlock();
     bench.write(at::START, &[AS_IT_WAS, 0, AS_IT_WAS]).unwrap();
     assert!(bench.device.outputs().is_empty(), "not saved");
@@ -272,7 +272,7 @@ fn safe_is_not_stored_as_commanded_after_a_reset_that_kept_it() {
     assert_eq!(bench.device.outputs(), commanded);
     let mut page = [0xFF; 200];
     encode_page(0, &commanded, &mut page).unwrap();
-    let (_, record) = records(&page).next().unwrap();
+    let (_, record) = records(&page, &MODIO_08).next().unwrap();
     let mut next = keeping(&stored);
     next.device
         .start_outputs(Some(&kept(&bench)), Some(&record));

@@ -17,8 +17,8 @@ fn link(source: u16, action: LinkAction, words: [u16; 2]) -> [u16; 4] {
 }
 
 /// A device with links of point 4, long enough after its start and after their write that they act.
-fn linked(first: [u16; 4], second: [u16; 4]) -> Bench<4> {
-    let mut bench = Bench::on(&MODIO_08, MODULES, &[(at::COMM_TIMEOUT, 10)]);
+fn linked(first: [u16; 4], second: [u16; 4]) -> Bench<Modio08> {
+    let mut bench = Bench::<Modio08>::on(MODULES, &[(at::COMM_TIMEOUT, 10)]);
     bench.unlock();
     for (second, words) in [(false, first), (true, second)] {
         assert_eq!(bench.write(links::of_point(OUTPUT, second), &words), Ok(()));
@@ -29,7 +29,7 @@ fn linked(first: [u16; 4], second: [u16; 4]) -> Bench<4> {
 
 const NONE: [u16; 4] = [0xFFFF, 0, 0, 0];
 
-impl Bench<4> {
+impl Bench<Modio08> {
     /// Scans a digital input with this level.
     fn input(&mut self, channel: usize, level: bool) {
         self.scan_port(0, |channels| channels.set_bit(channel, level));
@@ -84,7 +84,7 @@ fn links_of_digital_outputs_alone_exist() {
 
 #[test]
 fn links_are_locked_and_read_back_as_written() {
-    let mut bench = Bench::on(&MODIO_08, MODULES, &[]);
+    let mut bench = Bench::<Modio08>::on(MODULES, &[]);
     let words = link(3, Pulse, [25, 7]);
     assert_eq!(bench.write(0x0494, &words), Err(6), "locked");
     assert_eq!(
@@ -253,14 +253,13 @@ fn driven_output_never_has_what_a_master_writes_into_a_held_one() {
 
 /// A heater or a fan at point 4, and the codes of its sensor at input 1 of port 3 through the driver of the module.
 struct Sensor {
-    bench: Bench<4>,
+    bench: Bench<Modio08>,
     module: Ai4,
 }
 
 impl Sensor {
     fn new(range: u16, filter: u16, heater: [u16; 4]) -> Self {
-        let mut bench = Bench::on(
-            &MODIO_08,
+        let mut bench = Bench::<Modio08>::on(
             MODULES,
             &[
                 (at::FILTER + ANALOG, filter),

@@ -18,30 +18,30 @@ use modbus_server::line::{Faults, Framing, Port, Receiver};
 use modbus_server::{Adu, Server, crc};
 use modio_drivers::ChannelStatus;
 use modio_drivers::{Kind, Scale};
-use register_map::board::{ETH_IO5R, MODIO_02, MODIO_08};
-use register_map::{Board, Module, configuration as at};
+use register_map::board::{EthIo5r, MODIO_02, MODIO_08, Modio02, Modio08};
+use register_map::{Module, configuration as at};
 
 use super::*;
 use crate::config::Settings;
 
 /// A device with these modules in its slots, these stored settings, and a server.
-struct Bench<const SLOTS: usize = 1> {
-    device: &'static mut Device<SLOTS>,
+struct Bench<B: Board = Modio02> {
+    device: &'static mut Device<B>,
     server: Server,
 }
 
 impl Bench {
     fn new(module: Module, settings: &[(u16, u16)]) -> Self {
-        Self::on(&MODIO_02, [module], settings)
+        Self::on([module], settings)
     }
 }
 
-impl<const SLOTS: usize> Bench<SLOTS> {
-    fn on(board: &'static Board, modules: [Module; SLOTS], settings: &[(u16, u16)]) -> Self {
-        let ports = board.ports().map(at::module_of);
+impl<B: Board> Bench<B> {
+    fn on<const PORTS: usize>(modules: [Module; PORTS], settings: &[(u16, u16)]) -> Self {
+        let ports = B::ROW.ports().map(at::module_of);
         let mut pairs: Vec<_> = ports.zip(modules.map(Module::code)).collect();
         pairs.extend_from_slice(settings);
-        let (settings, rejected) = Settings::load(board, pairs.into_iter());
+        let (settings, rejected) = Settings::load(pairs.into_iter());
         assert_eq!(rejected, 0);
         let identity = Identity {
             unit: 1,
@@ -56,13 +56,8 @@ impl<const SLOTS: usize> Bench<SLOTS> {
         Self {
             device: Device::new_in(
                 Box::leak(Box::new_uninit()),
-                Config::new(board, settings, false),
+                Config::new(settings, false),
                 identity,
-                if *board == MODIO_02 {
-                    const { &Fixed::of(&MODIO_02) }
-                } else {
-                    const { &Fixed::of(&MODIO_08) }
-                },
             ),
             server: Server::new(Framing::Rtu),
         }
@@ -127,13 +122,14 @@ impl<const SLOTS: usize> Bench<SLOTS> {
             .device
             .points
             .ports()
-            .each_ref()
-            .map(|port| *port.channels());
+            .iter()
+            .map(|port| *port.channels())
+            .collect::<Vec<_>>();
         set(&mut channels[index]);
         for (slot, channels) in channels.iter().enumerate() {
             self.device.scanned(slot, channels, &[None; 4], true, 1);
         }
-        (0..SLOTS).for_each(|slot| self.device.run_links(slot));
+        (0..B::PORTS).for_each(|slot| self.device.run_links(slot));
     }
 
     /// Runs scans for this time.

@@ -43,7 +43,7 @@ fn the_running_module_keeps_its_settings_after_module_is_written() {
 #[test]
 fn four_modules_answer_at_their_own_addresses() {
     let modules = [Module::Di4, Module::Do4, Module::Ai4, Module::Ao4];
-    let mut bench = Bench::on(&MODIO_08, modules, &[(at::SAFE + 13, 7)]);
+    let mut bench = Bench::<Modio08>::on(modules, &[(at::SAFE + 13, 7)]);
     bench.scan_port(0, |channels| channels.set_bit(2, true));
     bench.scan_port(2, |channels| channels.set_word(3, 1234));
     // Inputs of port 1 and outputs of port 2 in one request, bits 0 to 7.
@@ -58,7 +58,7 @@ fn four_modules_answer_at_their_own_addresses() {
     assert_eq!(bench.write(11, &[0, 0]), Err(2), "an input");
     assert_eq!(bench.read(0x10, 1), Err(2), "port 5 has no slot");
 
-    let state = |bench: &mut Bench<4>| bench.read(0x0218, 8).unwrap();
+    let state = |bench: &mut Bench<Modio08>| bench.read(0x0218, 8).unwrap();
     let modules = std::vec![1, 2, 4, 5, 0, 0, 0, 0];
     assert_eq!(bench.read(0x0210, 8), Ok(modules));
     assert_eq!(state(&mut bench), [0, 0, 0, 0, 1, 1, 1, 1]);

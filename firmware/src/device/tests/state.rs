@@ -45,7 +45,7 @@ fn identity_and_state_are_read_and_never_written() {
 #[test]
 fn counters_of_a_second_line_exist_on_boards_with_one() {
     let modules = [Module::Di4, Module::Di4, Module::Do4, Module::Do4];
-    let mut bench = Bench::on(&ETH_IO5R, modules, &[]);
+    let mut bench = Bench::<EthIo5r>::on(modules, &[]);
     assert_eq!(bench.read(0x0230, 9).map(|words| words.len()), Ok(9));
     for (first, count) in [(0x0270, 9), (0x0270, 1), (0x0278, 1)] {
         assert_eq!(bench.read(first, count), Err(2));

@@ -14,7 +14,6 @@ use modbus_server::{Counters, Outcome, Server, Tables, crc, line::Framing};
 use modio_drivers::LoraSettings;
 
 use super::super::*;
-use crate::line::units;
 
 pub(super) const SETTINGS: LoraSettings = match LoraSettings::new(0, 23, 2, 0) {
     Some(settings) => settings,
@@ -128,7 +127,7 @@ impl InputPin for Pin {
 /// Unit 17 with ten registers of value 0x1111.
 pub(super) struct Bench<P = Lora<Shared, Pin, Pin>> {
     pub(super) module: Shared,
-    pub(super) line: SecondLine<P>,
+    pub(super) line: SecondLine<P, u8>,
     pub(super) server: Server,
     pub(super) registers: [u16; 10],
     pub(super) now_ms: u32,
@@ -146,7 +145,7 @@ impl Bench {
             [pin(true), pin(true)],
             pin(false),
             CONFIG,
-            units(Some(17), false).expect("an address"),
+            17,
             true,
             adus,
         );
@@ -190,15 +189,14 @@ impl Bench<Rs232<Shared>> {
     pub(super) fn rs232_starting() -> Self {
         let socket = Shared::default();
         socket.0.borrow_mut().room = 1000;
-        let units = units(Some(17), false).expect("an address");
         let adus = Box::leak(Box::new([Adu::new()]));
-        let line = SecondLine::rs232(socket.clone(), units, adus);
+        let line = SecondLine::rs232(socket.clone(), 17, adus);
         Self::with(socket, line)
     }
 }
 
 impl<P: Peer> Bench<P> {
-    fn with(module: Shared, line: SecondLine<P>) -> Self {
+    fn with(module: Shared, line: SecondLine<P, u8>) -> Self {
         Self {
             module,
             line,

@@ -6,7 +6,7 @@ use std::vec::Vec;
 use modbus_server::{Counters, Outcome};
 
 use super::bench::*;
-use crate::{line::units, second::Rs232};
+use crate::second::Rs232;
 
 /// Milliseconds from the call that finds the last byte of a complete frame to its end, one before that in which the reply
 /// begins. t3.5 of 9600 8N1 is 3.65.
@@ -121,9 +121,7 @@ fn reply_is_ending_while_the_uart_sends_its_last_two_bytes() {
 #[test]
 fn address_can_change() {
     let mut bench = Bench::rs232();
-    bench
-        .line
-        .set_units(units(Some(18), false).expect("an address"));
+    bench.line.set_units(18);
     assert_eq!(reply_to(&mut bench, &READ), []);
     let request = frame(&[0x12, 0x03, 0, 4, 0, 1]);
     assert_eq!(reply_to(&mut bench, &request)[..3], [0x12, 3, 2]);

@@ -151,9 +151,9 @@ mod tests {
             };
             let mut flash = vec![0xFF; layout.part.flash_size];
             write_preset(&fitted(Module::Do4), &mut flash);
-            let at = (layout.board.store.first - FLASH_BASE) as usize;
-            let page = at..at + layout.board.store.bytes as usize;
-            let (_, record) = record::records(&flash[page]).next().unwrap();
+            let at = (layout.board.store().first - FLASH_BASE) as usize;
+            let page = at..at + layout.board.store().bytes as usize;
+            let (_, record) = record::records(&flash[page], layout.board).next().unwrap();
             let modules = layout.board.ports().map(|port| (0x010F + port, 2));
             assert!(record.pairs().eq(modules), "{}", layout.board);
             let before = flash.clone();
@@ -161,7 +161,7 @@ mod tests {
             assert_eq!(flash, before, "a stored record is not replaced");
 
             let mut flash = vec![0xFF; layout.part.flash_size];
-            let [_, second] = layout.board.store.addresses();
+            let [_, second] = layout.board.store().addresses();
             flash[(second - FLASH_BASE) as usize + 500] = 0;
             let before = flash.clone();
             write_preset(&fitted(Module::Di4), &mut flash);
@@ -179,8 +179,8 @@ mod tests {
         };
         let mut flash = vec![0xFF; layout.part.flash_size];
         write_preset(&config, &mut flash);
-        let at = (layout.board.store.first - FLASH_BASE) as usize;
-        let (_, record) = record::records(&flash[at..]).next().unwrap();
+        let at = (layout.board.store().first - FLASH_BASE) as usize;
+        let (_, record) = record::records(&flash[at..], layout.board).next().unwrap();
         assert_eq!(record.pairs().last(), Some((configuration::LORA, 2)));
     }
 }

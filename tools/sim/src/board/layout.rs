@@ -213,9 +213,13 @@ mod tests {
             if let Some(radio) = layout.radio {
                 assert_eq!(radio.m0.port(), radio.m1.port(), "{board}");
             }
-            assert_eq!(layout.part.page_size, board.store.bytes as usize, "{board}");
-            for page in board.store.addresses() {
-                let end = (page + board.store.bytes - FLASH_BASE) as usize;
+            assert_eq!(
+                layout.part.page_size,
+                board.store().bytes as usize,
+                "{board}"
+            );
+            for page in board.store().addresses() {
+                let end = (page + board.store().bytes - FLASH_BASE) as usize;
                 assert!(end <= layout.part.flash_size, "{board}");
             }
         }

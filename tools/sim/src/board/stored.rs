@@ -12,7 +12,7 @@ impl Layout {
     pub(super) fn pages(&self, flash: &[u8]) -> [Range<usize>; 2] {
         let store = match self.holds_loader(flash) {
             true => self.board.layout().store,
-            false => self.board.store,
+            false => self.board.store(),
         };
         store.addresses().map(|address| {
             let start = (address - FLASH_BASE) as usize;
@@ -35,7 +35,7 @@ impl Layout {
         let records = pages
             .iter()
             .filter_map(|page| flash.get(page.clone()))
-            .flat_map(record::records)
+            .flat_map(|page| record::records(page, self.board))
             .map(|(_, record)| record)
             .filter(|record| !record.holds_outputs());
         let newest = records.reduce(|newest, record| {
@@ -87,7 +87,7 @@ mod tests {
         let mut flash = MODIO_08.flash_with(&settings).unwrap();
         assert!(!MODIO_08.stores_nothing(&flash));
         let page = &flash[0x3_F000..0x3_F800];
-        let (_, record) = record::records(page).next().unwrap();
+        let (_, record) = record::records(page, MODIO_08.board).next().unwrap();
         assert!(record.pairs().eq(settings));
         let ports = [1, 2, 4].map(|port| MODIO_08.configured(&flash, port));
         assert_eq!(ports, [Module::Di4, Module::None, Module::Ao4]);

@@ -201,8 +201,8 @@ fn assert_preset(board: &[&str], fitting: &[&str], name: &str, settings: &[(u16,
         "the rest of the file is erased"
     );
     let fitted = run(fitting);
-    let page = &fitted[(known.store.first - 0x0800_0000) as usize..];
-    let (_, record) = register_map::record::records(page).next().unwrap();
+    let page = &fitted[(known.store().first - 0x0800_0000) as usize..];
+    let (_, record) = register_map::record::records(page, known).next().unwrap();
     assert!(record.pairs().eq(settings.iter().copied()), "{name}");
     assert_eq!(
         run(&["--module", "4ai"]),
