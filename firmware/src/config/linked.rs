@@ -57,6 +57,11 @@ impl<B: Board> Config<B> {
         }
     }
 
+    /// Returns whether links were written since they were last set up.
+    pub fn has_written_links(&self) -> bool {
+        self.written_links.iter().any(|links| *links != 0)
+    }
+
     /// Returns the links of a slot that were written since the last call, a bit for each. COMMAND 3 and 4 write all links.
     pub fn take_written_links(&mut self, slot: usize) -> u8 {
         self.written_links.get_mut(slot).map_or(0, core::mem::take)

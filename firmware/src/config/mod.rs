@@ -68,6 +68,15 @@ fn port_at<B: Board>(index: usize) -> u16 {
     B::ROW.first_port.wrapping_add(index as u16)
 }
 
+/// Returns the points of a span of settings by point, point 0 in bit 0. A span of several settings has all points.
+const fn points_of(span: Span) -> u32 {
+    let first = span.start() % points::COUNT;
+    match points::COUNT.checked_sub(first + span.count()) {
+        Some(behind) => (u32::MAX >> behind) & (u32::MAX << first),
+        None => u32::MAX,
+    }
+}
+
 /// Checks whether registers of DEADBAND exist. The first one does.
 ///
 /// # Errors
@@ -88,8 +97,8 @@ pub struct Config<B: Board> {
     edited: Settings<B>,
     /// The stored settings, or those being stored.
     saved: Settings<B>,
-    /// Number of settings in `edited` that differ from `saved`.
-    differences: u16,
+    /// Whether a setting in `edited` differs from `saved`.
+    differs: bool,
     save: Save,
     /// The flash does not hold `saved`, because the stored configuration was invalid at the start.
     unstored: bool,
@@ -112,6 +121,8 @@ pub struct Config<B: Board> {
     left: u8,
     /// Links of each slot that were written and are to begin again, a bit for each.
     written_links: Each<B::Ports, u8>,
+    /// Points whose settings may have been written since they were last applied, point 0 in bit 0.
+    written_points: u32,
     revision: u16,
 }
 
@@ -130,7 +141,7 @@ impl<B: Board> Config<B> {
             modules: Each::of(|slot| stored.module(port_at::<B>(slot))),
             edited: stored,
             saved: stored,
-            differences: 0,
+            differs: false,
             save: Save::None,
             unstored: invalid,
             saves: Budget::new(SAVES),
@@ -142,6 +153,7 @@ impl<B: Board> Config<B> {
             waiting: false,
             left: 0,
             written_links: Each::all(0),
+            written_points: u32::MAX,
             revision: 0,
         }
     }
@@ -305,12 +317,15 @@ impl<B: Board> Config<B> {
         }
         let written = span.addresses().zip(words.iter());
         let settings = written.filter(|(address, _)| is_setting(*address));
-        let differences = settings.fold(self.differences, |differences, (address, value)| {
-            let saved = self.saved.get(address);
-            differences
-                .wrapping_sub(u16::from(self.edited.get(address) != saved))
-                .wrapping_add(u16::from(value != saved))
-        });
+        let differences = settings.fold(
+            self.edited.differences(&self.saved),
+            |differences, (address, value)| {
+                let saved = self.saved.get(address);
+                differences
+                    .wrapping_sub(u16::from(self.edited.get(address) != saved))
+                    .wrapping_add(u16::from(value != saved))
+            },
+        );
         differences == 0 && !self.unstored
     }
 
@@ -380,12 +395,18 @@ impl<B: Board> Config<B> {
             for (edited, value) in edited.iter_mut().zip(words.iter()) {
                 *edited = value;
             }
+            self.written_points |= points_of(span);
         } else {
             for (address, value) in span.addresses().zip(words.iter()) {
                 match address {
                     KEY | HEARTBEAT => {}
                     COMMAND => command = Command::from_code(value),
-                    _ => self.edited.set(address, value),
+                    _ => {
+                        self.edited.set(address, value);
+                        if port_of(address).is_some() {
+                            self.written_points = u32::MAX;
+                        }
+                    }
                 }
             }
             self.note_links(span);
@@ -440,7 +461,7 @@ impl<B: Board> Config<B> {
     /// Compares the edited settings with the others after [`revision`](Self::revision) has changed, before
     /// anything needs the result.
     pub fn compare(&mut self) {
-        self.differences = self.edited.differences(&self.saved);
+        self.differs = self.edited != self.saved;
         for (index, module) in self.modules.iter().enumerate() {
             if self.edited.module(port_at::<B>(index)) != *module {
                 self.left |= 1 << (index & 7);
@@ -448,10 +469,16 @@ impl<B: Board> Config<B> {
         }
     }
 
+    /// Returns the points whose settings may have been written since the last call, point 0 in bit 0.
+    pub const fn take_written_points(&mut self) -> u32 {
+        core::mem::replace(&mut self.written_points, 0)
+    }
+
     /// COMMAND 3: sets every setting to its default. These values are not stored in flash.
     pub fn load_defaults(&mut self) {
         self.edited = Settings::defaults();
         self.written_links = Each::all(u8::MAX);
+        self.written_points = u32::MAX;
         self.revision = self.revision.wrapping_add(1);
     }
 
@@ -459,6 +486,7 @@ impl<B: Board> Config<B> {
     pub fn drop_changes(&mut self) {
         self.edited = self.saved;
         self.written_links = Each::all(u8::MAX);
+        self.written_points = u32::MAX;
         self.left = 0;
         self.revision = self.revision.wrapping_add(1);
     }
@@ -468,7 +496,7 @@ impl<B: Board> Config<B> {
     pub fn begin_save(&mut self) {
         self.save = Save::Begun;
         self.saved = self.edited;
-        self.differences = 0;
+        self.differs = false;
     }
 
     /// Returns the settings that [`Self::begin_save`] copied.
@@ -494,7 +522,7 @@ impl<B: Board> Config<B> {
     /// Ends a save that failed. `stored` is what the flash still holds.
     pub fn save_failed(&mut self, stored: Settings<B>) {
         self.saved = stored;
-        self.differences = self.edited.differences(&self.saved);
+        self.differs = self.edited != self.saved;
         self.save = Save::None;
     }
 
@@ -552,7 +580,7 @@ impl<B: Board> Config<B> {
         const fn bit(mask: u16, set: bool) -> u16 {
             if set { mask } else { 0 }
         }
-        let unsaved = self.differences > 0 || self.has_save();
+        let unsaved = self.differs || self.has_save();
         bit(status::STORED_INVALID, self.invalid)
             | bit(status::UNSAVED, unsaved)
             | bit(status::RESTART_NEEDED, self.waiting)

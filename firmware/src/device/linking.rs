@@ -80,8 +80,9 @@ impl<B: Board> Device<B> {
         }
     }
 
-    /// Returns the channels of each slot whose settings have changed and are not applied yet, channel 1 in bit 0.
-    pub(super) fn changed_sources(&self) -> Each<B::Ports, u8> {
+    /// Returns the channels of each slot whose settings have changed and are not applied yet, channel 1 in bit 0. Of these
+    /// points, point 0 in bit 0.
+    pub(super) fn changed_sources(&self, points: u32) -> Each<B::Ports, u8> {
         let mut changed = Each::all(0);
         if !B::ROW.has_links() {
             return changed;
@@ -93,7 +94,8 @@ impl<B: Board> Device<B> {
             .zip(changed.iter_mut())
             .enumerate()
         {
-            for channel in 0..CHANNELS {
+            let points = points >> (Points::<B>::first_of(slot) & 31);
+            for channel in (0..CHANNELS).filter(|channel| points >> channel & 1 != 0) {
                 let point = self.config.point(slot, channel);
                 let differs = point.is_some_and(|to| port.setting(channel) != Some(&to.settings));
                 *changed |= u8::from(differs) << channel;

@@ -166,7 +166,9 @@ impl<B: Board> Device<B> {
             config,
         });
         device.configure_points();
-        device.for_each_point(|port, channel, point| port.command_raw(channel, point.start));
+        device.for_each_point(u32::MAX, |port, channel, point| {
+            port.command_raw(channel, point.start)
+        });
         device.begin_links(|_| 0);
         device
     }
@@ -176,16 +178,25 @@ impl<B: Board> Device<B> {
     fn configure_points(&mut self) {
         self.config.compare();
         self.revision = self.config.revision();
-        let changed = self.changed_sources();
-        self.for_each_point(IoPort::configure);
-        self.set_up_links(&changed);
+        let written = self.config.take_written_points();
+        let changed = self.changed_sources(written);
+        self.for_each_point(written, IoPort::configure);
+        if written == u32::MAX
+            || changed.iter().any(|channels| *channels != 0)
+            || self.config.has_written_links()
+        {
+            self.set_up_links(&changed);
+        }
     }
 
-    /// Passes the settings in force of every point to `act`, with the point's port and channel.
-    fn for_each_point(&mut self, act: fn(&mut IoPort<B>, usize, Point)) {
+    /// Passes the settings in force of these points, point 0 in bit 0, to `act`, with the point's port and channel.
+    fn for_each_point(&mut self, points: u32, act: fn(&mut IoPort<B>, usize, Point)) {
         for (index, port) in self.points.ports_mut().iter_mut().enumerate() {
+            let points = points >> (Points::<B>::first_of(index) & 31);
             for channel in 0..CHANNELS {
-                if let Some(point) = self.config.point(index, channel) {
+                if points >> channel & 1 != 0
+                    && let Some(point) = self.config.point(index, channel)
+                {
                     act(port, channel, point);
                 }
             }
