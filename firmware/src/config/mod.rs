@@ -97,8 +97,8 @@ pub struct Config<B: Board> {
     edited: Settings<B>,
     /// The stored settings, or those being stored.
     saved: Settings<B>,
-    /// Whether a setting in `edited` differs from `saved`.
-    differs: bool,
+    /// Number of settings in `edited` that differ from `saved`.
+    differences: u16,
     save: Save,
     /// The flash does not hold `saved`, because the stored configuration was invalid at the start.
     unstored: bool,
@@ -141,7 +141,7 @@ impl<B: Board> Config<B> {
             modules: Each::of(|slot| stored.module(port_at::<B>(slot))),
             edited: stored,
             saved: stored,
-            differs: false,
+            differences: 0,
             save: Save::None,
             unstored: invalid,
             saves: Budget::new(SAVES),
@@ -317,15 +317,12 @@ impl<B: Board> Config<B> {
         }
         let written = span.addresses().zip(words.iter());
         let settings = written.filter(|(address, _)| is_setting(*address));
-        let differences = settings.fold(
-            self.edited.differences(&self.saved),
-            |differences, (address, value)| {
-                let saved = self.saved.get(address);
-                differences
-                    .wrapping_sub(u16::from(self.edited.get(address) != saved))
-                    .wrapping_add(u16::from(value != saved))
-            },
-        );
+        let differences = settings.fold(self.differences, |differences, (address, value)| {
+            let saved = self.saved.get(address);
+            differences
+                .wrapping_sub(u16::from(self.edited.get(address) != saved))
+                .wrapping_add(u16::from(value != saved))
+        });
         differences == 0 && !self.unstored
     }
 
@@ -461,7 +458,7 @@ impl<B: Board> Config<B> {
     /// Compares the edited settings with the others after [`revision`](Self::revision) has changed, before
     /// anything needs the result.
     pub fn compare(&mut self) {
-        self.differs = self.edited != self.saved;
+        self.differences = self.edited.differences(&self.saved);
         for (index, module) in self.modules.iter().enumerate() {
             if self.edited.module(port_at::<B>(index)) != *module {
                 self.left |= 1 << (index & 7);
@@ -496,7 +493,7 @@ impl<B: Board> Config<B> {
     pub fn begin_save(&mut self) {
         self.save = Save::Begun;
         self.saved = self.edited;
-        self.differs = false;
+        self.differences = 0;
     }
 
     /// Returns the settings that [`Self::begin_save`] copied.
@@ -522,7 +519,7 @@ impl<B: Board> Config<B> {
     /// Ends a save that failed. `stored` is what the flash still holds.
     pub fn save_failed(&mut self, stored: Settings<B>) {
         self.saved = stored;
-        self.differs = self.edited != self.saved;
+        self.differences = self.edited.differences(&self.saved);
         self.save = Save::None;
     }
 
@@ -580,7 +577,7 @@ impl<B: Board> Config<B> {
         const fn bit(mask: u16, set: bool) -> u16 {
             if set { mask } else { 0 }
         }
-        let unsaved = self.differs || self.has_save();
+        let unsaved = self.differences > 0 || self.has_save();
         bit(status::STORED_INVALID, self.invalid)
             | bit(status::UNSAVED, unsaved)
             | bit(status::RESTART_NEEDED, self.waiting)
