@@ -6,10 +6,7 @@ use board_support::{
     kept,
 };
 use boot_state::{Record, journal::Journal};
-use firmware::{
-    device::Restart,
-    update::{After, Done, InSlot, Job, Update, described},
-};
+use firmware::update::{Failed, InSlot, Job, Update, described};
 use ports::pages::{Slot as _, WriteError};
 use register_map::update::{Slot, keys};
 use rtic::Mutex;
@@ -78,22 +75,7 @@ impl Updating {
                 return;
             };
             let image = other(flash);
-            let after = device.lock(|device| {
-                let update = device.update.as_mut();
-                let after = update.map_or(After::Nothing, |update| update.end(&job, done, image));
-                match after {
-                    After::Nothing => {}
-                    After::Restart => device.restart = Some(Restart::Update),
-                    // The 15 minutes may have just ended.
-                    After::Confirmed => {
-                        device
-                            .restart
-                            .take_if(|restart| *restart == Restart::Update);
-                    }
-                }
-                after
-            });
-            if after != After::Nothing {
+            if device.lock(|device| device.end_step(&job, done, image)) {
                 kept::end_choice();
             }
             self.ended = clock::millis();
@@ -104,27 +86,31 @@ impl Updating {
     }
 
     /// Performs a step. Returns `None` if it must wait, because the supply is low or the watchdog comes first.
-    fn perform(&mut self, job: &Job, flash: &mut Flash) -> Option<Done> {
+    fn perform(&mut self, job: &Job, flash: &mut Flash) -> Option<Result<(), Failed>> {
         let done = match job {
-            Job::Write(record) => write(&mut self.journal, flash, *record).map(Done::Written),
+            Job::Write(record) => write(&mut self.journal, flash, *record),
             Job::InSlot(job) => job.perform(&mut flash.other_slot()?, |parts| self.crc.of(parts)),
         };
         match done {
             Ok(done) => Some(done),
             Err(FlashError::NotNow) => None,
-            Err(FlashError::Failed) => Some(job.failed()),
+            Err(FlashError::Failed) => Some(Err(Failed(None))),
         }
     }
 }
 
-/// Writes a boot state that is not in force yet. Returns whether it could.
-fn write(journal: &mut Journal, flash: &mut Flash, record: Record) -> Result<bool, FlashError> {
+/// Writes a boot state that is not in force yet. Returns how that has ended.
+fn write(
+    journal: &mut Journal,
+    flash: &mut Flash,
+    record: Record,
+) -> Result<Result<(), Failed>, FlashError> {
     if journal.record() == Some(record) {
-        return Ok(true);
+        return Ok(Ok(()));
     }
     match journal.write(&mut BootPages(flash), record) {
-        Ok(()) => Ok(true),
-        Err(WriteError::Worn) => Ok(false),
+        Ok(()) => Ok(Ok(())),
+        Err(WriteError::Worn) => Ok(Err(Failed(None))),
         Err(WriteError::Flash(error)) => Err(error),
     }
 }

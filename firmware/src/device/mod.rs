@@ -51,7 +51,7 @@ pub use port::IoPort;
 pub use state::{Identity, State};
 
 use crate::config::{Config, LineName, Origin, Point};
-use crate::update::{TRIAL_S, Update, order_of};
+use crate::update::{Failed, Job, Order, TRIAL_S, Update, order_of};
 
 /// The device behind the line.
 #[derive(Debug)]
@@ -339,6 +339,21 @@ impl<B: Board> Device<B> {
         {
             update.take(order, line);
         }
+    }
+
+    /// Notes the end of a step of the update, as [`Update::end`], and restarts if it has carried out an order that asks for
+    /// it. Returns whether the choice of SW01 = 254 ends.
+    pub fn end_step(&mut self, job: &Job, done: Result<(), Failed>, image: [u16; 10]) -> bool {
+        let update = self.update.as_mut();
+        match update.and_then(|update| update.end(job, done, image)) {
+            Some(Order::Finish | Order::GoBack) => self.restart = Some(Restart::Update),
+            // The 15 minutes may have just ended.
+            Some(Order::Confirm) => {
+                self.restart.take_if(|restart| *restart == Restart::Update);
+            }
+            Some(Order::Prepare) | None => return false,
+        }
+        true
     }
 
     /// Checks whether a write of the configuration may give the order of an update that it contains, if any.

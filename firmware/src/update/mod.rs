@@ -29,7 +29,7 @@ use register_map::update::{BLOCK, BLOCK_BYTES, Header, Reason, Slot, State, bloc
 use crate::config::LineName;
 pub use boot_state::commands::Order;
 use missing::Missing;
-pub use work::{Block, Done, InSlot, Job, described};
+pub use work::{Block, Failed, InSlot, Job, described};
 
 /// Seconds after which an image on trial that nobody has confirmed restarts.
 pub const TRIAL_S: u32 = 15 * 60;
@@ -47,17 +47,6 @@ pub const fn order_of(command: Command) -> Option<Order> {
         Command::GoBack => Some(Order::GoBack),
         _ => None,
     }
-}
-
-/// What follows the end of a step.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum After {
-    /// Nothing.
-    Nothing,
-    /// The running image is confirmed: the choice of SW01 = 254 ends.
-    Confirmed,
-    /// The choice of SW01 = 254 ends, and the device restarts.
-    Restart,
 }
 
 /// The update of a device behind the loader.
@@ -389,26 +378,25 @@ impl Update {
     }
 
     /// Notes the end of the step that [`Self::next`] has returned. `image` describes the image in the other slot, as it
-    /// is now.
-    pub fn end(&mut self, job: &Job, done: Done, image: [u16; 10]) -> After {
+    /// is now. Returns the order that this step has carried out, if any.
+    pub fn end(&mut self, job: &Job, done: Result<(), Failed>, image: [u16; 10]) -> Option<Order> {
         self.images[1] = image;
         match (job, done) {
-            (Job::InSlot(InSlot::Erase(page)), Done::Erased(erased)) => {
-                self.end_erase(*page, erased);
+            (Job::InSlot(InSlot::Erase(page)), done) => self.end_erase(*page, done.is_ok()),
+            (Job::InSlot(InSlot::Program(block)), done) => {
+                self.end_program(block.number, done.is_ok());
             }
-            (Job::InSlot(InSlot::Program(block)), Done::Programmed(fits)) => {
-                self.end_program(block.number, fits);
-            }
-            (_, Done::Checked(Ok(()))) => self.intact = true,
-            (_, Done::Checked(Err(reason))) => {
+            (Job::InSlot(InSlot::Check), Ok(())) => self.intact = true,
+            (Job::Write(record), Ok(())) => return self.end_order(*record),
+            (Job::InSlot(InSlot::Check) | Job::Write(_), Err(Failed(reason))) => {
                 self.order = None;
-                self.reason.set(Some(reason));
-                self.missing = Missing::all(self.missing.blocks());
+                if reason.is_some() {
+                    self.reason.set(reason);
+                    self.missing = Missing::all(self.missing.blocks());
+                }
             }
-            (Job::Write(record), Done::Written(true)) => return self.end_order(*record),
-            _ => self.order = None,
         }
-        After::Nothing
+        None
     }
 
     fn end_erase(&mut self, page: u16, erased: bool) {
@@ -440,10 +428,11 @@ impl Update {
         }
     }
 
-    fn end_order(&mut self, record: Record) -> After {
+    fn end_order(&mut self, record: Record) -> Option<Order> {
         self.running.record = record;
-        match self.order.take() {
-            Some(Order::Prepare) => {
+        let order = self.order.take()?;
+        match order {
+            Order::Prepare => {
                 self.running.prepared = true;
                 self.header = None;
                 self.refused.set(false);
@@ -453,19 +442,12 @@ impl Update {
                 self.bad = None;
                 self.repairs = REPAIRS;
                 self.reason.set(None);
-                After::Nothing
             }
-            Some(Order::Confirm) => {
-                self.switched = false;
-                After::Confirmed
-            }
-            Some(Order::Finish | Order::GoBack) => {
-                // Nothing changes the image any more before the restart.
-                self.running.prepared = false;
-                After::Restart
-            }
-            None => After::Nothing,
+            Order::Confirm => self.switched = false,
+            // Nothing changes the image any more before the restart.
+            Order::Finish | Order::GoBack => self.running.prepared = false,
         }
+        Some(order)
     }
 }
 

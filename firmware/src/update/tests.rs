@@ -75,7 +75,7 @@ struct Unit {
     flash: Flash,
     written: Vec<Record>,
     refuses: bool,
-    after: After,
+    carried_out: Option<Order>,
 }
 
 impl Unit {
@@ -99,7 +99,7 @@ impl Unit {
             },
             written: Vec::new(),
             refuses: false,
-            after: After::Nothing,
+            carried_out: None,
         }
     }
 
@@ -117,19 +117,19 @@ impl Unit {
             return false;
         };
         let done = match &job {
-            Job::Write(_) if self.refuses => job.failed(),
+            Job::Write(_) if self.refuses => Err(Failed(None)),
             Job::Write(record) => {
                 self.written.push(*record);
-                Done::Written(true)
+                Ok(())
             }
             Job::InSlot(step) => match step.perform(&mut self.flash, crc32) {
                 Ok(done) => done,
                 Err(Refused::Low) => return false,
-                Err(Refused::NotErased) => job.failed(),
+                Err(Refused::NotErased) => Err(Failed(None)),
             },
         };
         let image = described(&self.flash.bytes);
-        self.after = self.update.end(&job, done, image);
+        self.carried_out = self.update.end(&job, done, image);
         true
     }
 
@@ -209,7 +209,7 @@ fn whole_image_becomes_new_and_the_device_restarts() {
     assert_eq!(unit.flash.erases, 54, "no page was bad");
     assert_eq!(unit.update.record(16 + 5), 20, "blocks of the other image");
     unit.order(Order::Finish);
-    assert_eq!(unit.after, After::Restart);
+    assert_eq!(unit.carried_out, Some(Order::Finish));
     assert_eq!(unit.send(1, &image[128..256]), BUSY, "it is checked");
     let states: Vec<_> = unit.written.iter().map(|record| record.states[1]).collect();
     assert_eq!(states, [State::Receiving, State::New]);
@@ -335,7 +335,7 @@ fn another_image_over_the_first_one_erases_what_differs() {
     }
     assert_eq!(unit.flash.erases - 54, 3, "pages of 8 blocks");
     unit.order(Order::Finish);
-    assert_eq!(unit.after, After::Restart);
+    assert_eq!(unit.carried_out, Some(Order::Finish));
 }
 
 #[test]
@@ -365,13 +365,13 @@ fn wrong_crc_leaves_the_state_and_every_block_counts_as_missing() {
     wrong[600] ^= 2;
     unit.send_all(&wrong);
     unit.order(Order::Finish);
-    assert_eq!((unit.state(), unit.after), ([1, 6, 20, 20], After::Nothing));
+    assert_eq!((unit.state(), unit.carried_out), ([1, 6, 20, 20], None));
     assert_eq!(unit.written.len(), 1);
     // The missing bit can only be erased.
     unit.send_all(&wrong);
     unit.flash.bytes[600] ^= 2;
     unit.order(Order::Finish);
-    assert_eq!(unit.after, After::Restart);
+    assert_eq!(unit.carried_out, Some(Order::Finish));
 }
 
 #[test]
@@ -387,7 +387,7 @@ fn orders_need_a_confirmed_image_and_a_genuine_one_to_go_back_to() {
     unit.flash.bytes = image(5);
     assert_eq!(check(&unit), [true, true, true, false]);
     unit.order(Order::Finish);
-    assert_eq!(unit.after, After::Restart);
+    assert_eq!(unit.carried_out, Some(Order::Finish));
     // Confirmed, but below the floor, and then not.
     let mut unit = Unit::new(State::Confirmed);
     assert_eq!(check(&unit), [true, false, true, false]);
@@ -406,8 +406,8 @@ fn orders_need_a_confirmed_image_and_a_genuine_one_to_go_back_to() {
     assert_eq!(check(&unit), [false, false, true, false]);
     unit.order(Order::Confirm);
     assert_eq!(
-        (unit.after, unit.update.is_on_trial()),
-        (After::Confirmed, false)
+        (unit.carried_out, unit.update.is_on_trial()),
+        (Some(Order::Confirm), false)
     );
     assert_eq!(
         unit.update.record(status::FLOOR),

@@ -31,21 +31,13 @@ pub enum InSlot {
     Check,
 }
 
-/// How a step has ended.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Done {
-    /// The page is erased, or could not be.
-    Erased(bool),
-    /// The block is in the slot, or does not fit what lies there.
-    Programmed(bool),
-    /// The image is intact, or what is wrong with it.
-    Checked(Result<(), Reason>),
-    /// The boot state is written, or could not be.
-    Written(bool),
-}
+/// A step has not done what it was for: the page is not erased, the block does not fit what lies there, the boot state is
+/// not written, or the image is not intact, with what is wrong with it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Failed(pub Option<Reason>);
 
 impl InSlot {
-    /// Performs the step. `crc` computes a CRC-32.
+    /// Performs the step. Returns how it has ended. `crc` computes a CRC-32.
     ///
     /// # Errors
     ///
@@ -54,31 +46,23 @@ impl InSlot {
         &self,
         slot: &mut S,
         crc: impl FnOnce([&[u8]; 2]) -> u32,
-    ) -> Result<Done, S::Error> {
-        match self {
+    ) -> Result<Result<(), Failed>, S::Error> {
+        let done = match self {
             Self::Erase(page) => {
                 let page = usize::from(*page);
                 slot.erase(page)?;
                 let size = slot.page_bytes();
                 let bytes = slot.bytes().get(page * size..).unwrap_or_default();
                 let mut bytes = bytes.iter().take(size);
-                Ok(Done::Erased(bytes.all(|byte| *byte == 0xFF)))
+                bytes.all(|byte| *byte == 0xFF)
             }
-            Self::Program(block) => program(slot, block).map(Done::Programmed),
-            Self::Check => Ok(Done::Checked(intact(slot.bytes(), crc).map(drop))),
-        }
-    }
-}
-
-impl Job {
-    /// Returns how the step has ended when the flash refuses it for good.
-    #[must_use]
-    pub const fn failed(&self) -> Done {
-        match self {
-            Self::InSlot(InSlot::Erase(_)) => Done::Erased(false),
-            Self::InSlot(InSlot::Program(_)) => Done::Programmed(false),
-            Self::Write(_) | Self::InSlot(InSlot::Check) => Done::Written(false),
-        }
+            Self::Program(block) => program(slot, block)?,
+            Self::Check => {
+                let intact = intact(slot.bytes(), crc);
+                return Ok(intact.map(drop).map_err(|reason| Failed(Some(reason))));
+            }
+        };
+        Ok(if done { Ok(()) } else { Err(Failed(None)) })
     }
 }
 

@@ -32,11 +32,11 @@ fn bench(own: OfSlot, lora: u16) -> Bench {
 
 /// Performs the next step of the update, which must be a change of the boot state.
 fn write_state(bench: &mut Bench) {
-    use crate::update::{Done, Job};
+    use crate::update::Job;
     let update = bench.device.update.as_mut().unwrap();
     let job = update.next().unwrap();
     assert!(matches!(job, Job::Write(_)));
-    update.end(&job, Done::Written(true), [0; 10]);
+    update.end(&job, Ok(()), [0; 10]);
 }
 
 #[test]
@@ -194,9 +194,8 @@ fn block_keeps_the_lock_open_and_needs_none() {
     assert_eq!(bench.write(at::COMMAND, &[PREPARE]), Ok(()));
     write_state(&mut bench);
     while let Some(job) = bench.device.update.as_ref().unwrap().next() {
-        use crate::update::Done;
         let update = bench.device.update.as_mut().unwrap();
-        update.end(&job, Done::Erased(true), [0; 10]);
+        update.end(&job, Ok(()), [0; 10]);
     }
     bench.device.tick(59_000);
     assert_eq!(bench.ask(&block()), block());
