@@ -1,17 +1,6 @@
 //! The device: the tasks and the resources they share.
 //!
-//! | task | bound to | priority | duty, and what an overrun costs |
-//! |---|---|---|---|
-//! | `beat` | TIM4, 1 kHz | 4 | advances the device's clock, runs the line's response delay, checks the registers, pends `scan`. If late, the clock is late |
-//! | `uart` | LINE: USART1 or the board's UART | 4 | reads or writes a byte, turns the driver off at the end. At 921600 bit/s a byte is received every 12 us; if the task is later than that, a byte is lost, the receiver reports an overrun and the frame is discarded |
-//! | `gap` | TIM2 | 4 | handles t1.5 and t3.5. If late, a silence becomes longer, never shorter |
-//! | `second_uart` | SECOND: USART3 or the board's UART | 4 | moves a byte between the UART of the second line and the queues. A byte is received every 1.04 ms; if the task is later than that, a byte is lost |
-//! | `alarm` | TIM1_CC | 4 | takes the unit's turns in an arbitration. If late, a start bit is, which the windows allow for up to 8.5 us. Aborts a reply that does not end |
-//! | `serve` | SERVE: EXTI3 or the board's, pended by `gap`, `uart` and `second` | 3 | serves a complete frame; executes a command when its response has been sent. If late, the response is late |
-//! | `scan` | EXTI1, pended by `beat` and by a write | 2 | copies inputs into the device and outputs to the modules, runs the time-outs. If late, it catches up |
-//! | `second` | EXTI4, pended by `scan` while there is a second line: a radio that is on, or RS-232 | 2 | sets the radio up, receives frames and sends replies through the queues. If late, a silence becomes longer, never shorter |
-//! | `background` | EXTI0, pended every 10 ms and on commands | 1 | DAC transfers, configuration store, LEDs, log. Not urgent |
-//! | `idle` | - | - | refreshes the watchdog when each task above has set its mark; sleeps |
+//! docs/architecture.md has a table of the tasks, with what it costs when one is late.
 //!
 //! The tasks of priority 4 run from RAM with all that they call (`memory.x`). They continue while flash is erased
 //! or programmed; the others wait for up to 40 ms, on clones of the part 400.

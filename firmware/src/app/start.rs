@@ -3,12 +3,12 @@
 use core::mem::MaybeUninit;
 
 use board_support::{
-    Flash, SLOT, ScanTimer, SecondUart, Watchdog, board, boards::SLOTS, flash::FlashError,
-    gap::LineTimes, kept, pac, stack::LowWater,
+    Flash, SLOT, ScanTimer, SecondUart, Watchdog, board, boards::SLOTS, flash::FlashError, kept,
+    pac, stack::LowWater,
 };
 use cortex_m::peripheral::SCB;
 use firmware::{
-    config::{self, Config, LineConfig, RadioConfig},
+    config::{Config, LineConfig, RadioConfig},
     device::Identity,
     kept_outputs::KeptOutputs,
     leds::{Leds, Trouble},
@@ -16,14 +16,10 @@ use firmware::{
     start_up::{self, Address, RECOVERY_UNIT},
     store::{Store, WriteError},
 };
-use modbus_server::{
-    Adu, fast,
-    line::{Framing, Gaps, Port, Receiver, Width, Windows},
-};
+use modbus_server::{Adu, fast};
 use modio_drivers::DacLink;
-use ports::uart;
 use register_map::{
-    codes::{Format, GapRule, Mode},
+    codes::Mode,
     configuration::UNIT,
     state::{build as build_bits, reset_cause::POWER_ON},
     update::{DEVELOPMENT_KEY, Header},
@@ -34,7 +30,7 @@ use crate::{
     board::{BOARD, Device, Events},
     fault_record,
     installed::install,
-    line::Line,
+    line::{Frames, Line},
     log::{self, Log},
     persistence::Persistence,
     scanning::Scanning,
@@ -99,7 +95,6 @@ pub fn up(
     let points_only = config.air_serves_points_only();
     // A radio does not serve recovery, whose address is the same for all units.
     let radio_config = radio_config.filter(|_| matches!(address, Address::Unit(_)));
-    let on_wire = wire_settings(settings);
 
     let mut sampler = board.sampler;
     let (modules, analog_outputs) =
@@ -121,17 +116,7 @@ pub fn up(
         build: build(board.development),
     };
     let device = Device::new_in(place, config, identity);
-    let kept = if BOARD.has_links() {
-        kept::outputs()
-    } else {
-        None
-    };
-    let kept = kept.map(|(values, modules, held, at_safe)| KeptOutputs {
-        values,
-        modules,
-        held,
-        at_safe,
-    });
+    let kept = kept_outputs();
     let stored = if BOARD.keeps_outputs {
         store.outputs(&pages)
     } else {
@@ -166,51 +151,9 @@ pub fn up(
     // An erase that failed here is done by the background task, as after a change of pages.
     let erase = prepared.is_err() && !store.has_spare();
 
-    let framing = match settings.mode {
-        Mode::Rtu => Framing::Rtu,
-        Mode::Ascii => Framing::ASCII,
-    };
-    let gaps = Gaps::standard(on_wire.baud, on_wire.format.bits() as u8);
-    let t35 = settings
-        .frame_gap
-        .map_or(gaps.t35, |tenths| gaps.frame_gap(tenths));
-    let line = Events::units(address.unit(), is_fast).and_then(|units| {
-        let strict = settings.gap_rule == GapRule::Drop;
-        let (receiver, (t15_ns, t35_ns)) = match framing {
-            Framing::Rtu => (Receiver::rtu(units, strict), (gaps.t15.min(t35), t35)),
-            Framing::Ascii { .. } => {
-                let width = match settings.format.data_bits() {
-                    7 if on_wire.format.stop_in_data() != 0 => Width::SevenAndStop,
-                    7 => Width::Seven,
-                    _ => Width::Eight,
-                };
-                (Receiver::ascii(units, width), (t35, Gaps::ASCII_TIMEOUT))
-            }
-        };
-        let limit_us = longest_reply_us(on_wire, framing);
-        let times = LineTimes {
-            t15_ns,
-            t35_ns,
-            limit_us,
-        };
-        let (uart, gap) = board.line.start(on_wire, times, &mut board.rcc)?;
-        // The count may begin just before a tick.
-        let longest_ms = (limit_us / 1000) as u16 + 2;
-        let port = Port::new(receiver, adus);
-        // Without function 70 nothing needs these times.
-        let (bit, us) = if BOARD.events {
-            gap.bit_and_us()
-        } else {
-            (0, 0)
-        };
-        Some(Line::new(
-            uart,
-            gap,
-            port,
-            Windows::new(bit, us),
-            longest_ms,
-        ))
-    });
+    let frames = Frames::of(&settings);
+    let line = Events::units(address.unit(), is_fast)
+        .and_then(|units| frames.start(board.line, &mut board.rcc, units, adus));
 
     let second = second::Start {
         line: board.second,
@@ -231,7 +174,7 @@ pub fn up(
                 let part = start_up::part(address, board.clock.is_crystal());
                 fast::Unit::new(serial_number, identity.unit, part)
             }),
-            (framing, t35.div_ceil(1_000_000)),
+            (frames.framing, frames.t35_ns.div_ceil(1_000_000)),
             points_only,
         ),
         device,
@@ -266,31 +209,16 @@ fn build(trusted: bool) -> u16 {
     bit(build_bits::DEVELOPMENT_SIGNED, signed) | bit(build_bits::DEVELOPMENT_TRUSTED, trusted)
 }
 
-/// Returns a limit for the duration of a reply in microseconds: the longest frame with a bit between characters, as clones
-/// of the part send it, and with 2 % and a millisecond in reserve.
-fn longest_reply_us(line: uart::LineSettings, framing: Framing) -> u32 {
-    // V1.02 2.5.1 and 2.5.2.1: 256 bytes in RTU mode, 513 characters in ASCII mode.
-    let characters = match framing {
-        Framing::Rtu => 256,
-        Framing::Ascii { .. } => 513,
-    };
-    let bits = characters * (line.format.bits() + 1);
-    // At most 513 * 12 bits, so the product fits 32 bits.
-    let us = bits * 10_000 / (line.baud / 100).max(1);
-    us + us / 50 + 1_000
-}
-
-fn wire_settings(line: config::LineConfig) -> uart::LineSettings {
-    uart::LineSettings {
-        baud: line.baud,
-        format: match line.format {
-            Format::F8N2 => uart::Format::N2,
-            Format::F8E1 => uart::Format::E1,
-            Format::F8O1 => uart::Format::O1,
-            Format::F8N1 => uart::Format::N1,
-            Format::F7E1 => uart::Format::SevenE1,
-            Format::F7O1 => uart::Format::SevenO1,
-            Format::F7N2 => uart::Format::SevenN2,
-        },
+/// Returns what a reset has kept of the outputs.
+fn kept_outputs() -> Option<KeptOutputs> {
+    if !BOARD.has_links() {
+        return None;
     }
+    let (values, modules, held, at_safe) = kept::outputs()?;
+    Some(KeptOutputs {
+        values,
+        modules,
+        held,
+        at_safe,
+    })
 }

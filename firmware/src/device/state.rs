@@ -163,30 +163,28 @@ impl<B: Board> State<B> {
 
     /// Returns a register other than the status, or 0 for one that does not exist.
     pub(super) fn word(&self, address: u16, points: &Points<B>, config: &Config<B>) -> u16 {
-        let [product_high, product_low] = words_of(at::PRODUCT);
-        let [uptime_high, uptime_low] = words_of(self.uptime_s);
-        let [millis_high, millis_low] = words_of(self.millis);
-        let [serial_high, serial_low] = words_of(self.identity.serial_number);
-        let [commit_high, commit_low] = words_of(built::COMMIT);
         let [version, patch] = VERSION;
+        // Numbers of 32 bits begin at even addresses.
+        let double = match address & !1 {
+            at::PRODUCT_CODE => Some(at::PRODUCT),
+            at::UPTIME => Some(self.uptime_s),
+            at::UPTIME_MS => Some(self.millis),
+            at::SERIAL_NUMBER => Some(self.identity.serial_number),
+            at::COMMIT => Some(built::COMMIT),
+            _ => None,
+        };
+        if let Some(number) = double {
+            let [high, low] = words_of(number);
+            return if address & 1 == 0 { high } else { low };
+        }
         match address {
-            0x0200 => product_high,
-            0x0201 => product_low,
             at::FIRMWARE_VERSION => version,
             at::FIRMWARE_PATCH => patch,
             at::MAP_VERSION => at::MAP_VERSION_VALUE,
             at::BOARD => B::ROW.code,
             at::UNIT_ADDRESS => self.identity.unit.into(),
             at::RESET_CAUSE => self.identity.reset_cause.into(),
-            at::UPTIME => uptime_high,
-            0x0209 => uptime_low,
-            at::UPTIME_MS => millis_high,
-            0x0227 => millis_low,
-            at::SERIAL_NUMBER => serial_high,
-            0x0229 => serial_low,
             at::STACK_FREE => self.stack_free,
-            at::COMMIT => commit_high,
-            0x020D => commit_low,
             at::BUILD => built::FLAGS | self.identity.build,
             at::MODULE_IN_FORCE.. => self.by_index(address, points, config),
             _ => 0,
