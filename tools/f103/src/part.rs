@@ -3,8 +3,10 @@
 //! A part has a register block if RCC has a bit for its clock (RM0008 1.3 and table 3). A block of a larger part that
 //! is not modelled is reported by its name when it is accessed.
 
-use crate::soc::PORTS;
 use crate::soc::map::Block;
+
+/// Number of ports that are modelled: A to E.
+pub const PORTS: usize = 5;
 
 /// The package's pins of ports A to E, one bit each.
 type Ports = [u16; PORTS];

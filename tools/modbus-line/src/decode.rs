@@ -1,7 +1,6 @@
 //! Describes requests and responses in words, for people.
 
 use crate::adu::{Framing, RTU_MOST, bytes};
-use crate::other::wrong_count;
 use crate::{Direction, fast, names};
 
 /// Describes a frame in words: the unit, and the request or response. `request` is the PDU of the preceding
@@ -111,7 +110,7 @@ fn fields(code: u8, pdu: &[u8]) -> Option<String> {
             word(pdu, 5)?,
             words(pdu.get(10..)?)
         ),
-        fast::FUNCTION => fast::words(pdu, None)?,
+        fast::FUNCTION => message(pdu, None)?,
         0x2B if pdu.get(1) == Some(&0x0E) => format!(
             "read device identification, code {:02X}, from object {:02X}",
             pdu.get(2)?,
@@ -119,6 +118,23 @@ fn fields(code: u8, pdu: &[u8]) -> Option<String> {
         ),
         _ => return None,
     })
+}
+
+/// Describes a message of function 70, and the PDU that it carries to or from the unit with a serial number. `request` is
+/// the PDU of the request before a reply.
+fn message(pdu: &[u8], request: Option<&[u8]>) -> Option<String> {
+    let text = fast::words(pdu)?;
+    let Some((direction, carried)) = fast::carried(pdu) else {
+        return Some(text);
+    };
+    let carried = match direction {
+        Direction::Request => self::request(carried),
+        Direction::Response => {
+            let asked = request.and_then(fast::carried);
+            response(carried, asked.map(|(_, pdu)| pdu))
+        }
+    };
+    Some(format!("{text}: {carried}"))
 }
 
 /// Describes a response in words.
@@ -141,6 +157,30 @@ pub fn response(pdu: &[u8], request: Option<&[u8]>) -> String {
         .map_or_else(|| with_rest(&name, pdu), |text| format!("{name} {text}"))
 }
 
+/// Returns what is wrong with the byte count of a response to a read; `None` if nothing is, or for other functions.
+pub(crate) fn wrong_count(request: &[u8], response: &[u8]) -> Option<String> {
+    let (0x01..=0x04 | 0x17, [_, count, data @ ..]) = (*request.first()?, response) else {
+        return None;
+    };
+    let asked = usize::from(u16::from_be_bytes(*request.get(3..)?.first_chunk()?));
+    let right = match request[0] {
+        0x01 | 0x02 => asked.div_ceil(8),
+        _ => asked * 2,
+    };
+    let count = usize::from(*count);
+    let is_same = request.first() == response.first();
+    match is_same && (count, data.len()) != (right, right) {
+        true if count == data.len() => {
+            Some(format!("its byte count is {count}, and {right} is right"))
+        }
+        true => Some(format!(
+            "its byte count is {count}, but it has {}",
+            count_of(data)
+        )),
+        false => None,
+    }
+}
+
 fn answered(code: u8, pdu: &[u8], request: Option<&[u8]>) -> Option<String> {
     let from = request.and_then(|request| word(request, 1));
     let from = from.map_or_else(String::new, |first| format!("{first:#06X} "));
@@ -160,7 +200,7 @@ fn answered(code: u8, pdu: &[u8], request: Option<&[u8]>) -> Option<String> {
         0x0C => log(pdu)?,
         0x11 => identity(pdu)?,
         0x14 => groups(pdu)?,
-        fast::FUNCTION => fast::words(pdu, request)?,
+        fast::FUNCTION => message(pdu, request)?,
         0x2B => {
             let objects = objects(pdu)?.into_iter();
             let texts = objects.map(|(id, text)| format!("{id:02X} \"{text}\""));

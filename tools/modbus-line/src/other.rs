@@ -3,7 +3,7 @@
 
 use crate::Waiting;
 use crate::adu::{Framing, MBAP, request_length, response_length};
-use crate::decode::count_of;
+use crate::decode::wrong_count;
 use crate::waiting::NOISE;
 
 /// Telnet's code for the beginning of a command. As data it is sent twice (RFC 854).
@@ -77,31 +77,6 @@ impl Waiting<'_> {
         }
         wrong_count(self.pdu, pdu)
             .unwrap_or_else(|| "it answers another request of this function".to_owned())
-    }
-}
-
-/// Returns what is wrong with the byte count of a response to a read; `None` if nothing is, or for other functions.
-#[must_use]
-pub fn wrong_count(request: &[u8], response: &[u8]) -> Option<String> {
-    let (0x01..=0x04 | 0x17, [_, count, data @ ..]) = (*request.first()?, response) else {
-        return None;
-    };
-    let asked = usize::from(u16::from_be_bytes(*request.get(3..)?.first_chunk()?));
-    let right = match request[0] {
-        0x01 | 0x02 => asked.div_ceil(8),
-        _ => asked * 2,
-    };
-    let count = usize::from(*count);
-    let is_same = request.first() == response.first();
-    match is_same && (count, data.len()) != (right, right) {
-        true if count == data.len() => {
-            Some(format!("its byte count is {count}, and {right} is right"))
-        }
-        true => Some(format!(
-            "its byte count is {count}, but it has {}",
-            count_of(data)
-        )),
-        false => None,
     }
 }
 

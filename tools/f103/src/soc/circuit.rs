@@ -1,14 +1,11 @@
 //! The circuit that is connected to the pins of the part.
 
-use crate::part::Part;
+use crate::part::{PORTS, Part};
 use crate::periph::adc::Adc;
 use crate::periph::gpio::{Drive, Gpio};
 use crate::periph::i2c::Bus;
 use crate::periph::usart::Wire;
 use crate::time::Time;
-
-/// Number of ports that are modelled: A to E.
-pub const PORTS: usize = 5;
 
 /// A pin of the part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -16,7 +16,7 @@ mod wires;
 
 use crate::finding::What;
 use crate::memory::Memory;
-use crate::part::Part;
+use crate::part::{PORTS, Part};
 use crate::periph::adc::Adc;
 use crate::periph::afio::Afio;
 use crate::periph::can::Can;
@@ -35,7 +35,7 @@ use crate::periph::timer::{Kind, Timer};
 use crate::periph::usart::Usart;
 use crate::peripheral::Peripheral;
 use crate::time::Time;
-pub use circuit::{Circuit, PORTS, Pin, Pins};
+pub use circuit::{Circuit, Pin, Pins};
 pub use config::Config;
 use map::{BLOCKS, Block};
 use serial::{Places, USARTS};

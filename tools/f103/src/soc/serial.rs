@@ -1,9 +1,10 @@
 //! The USARTs, their pins, and the devices that are connected to them.
 
 use super::Soc;
-use super::circuit::{Circuit, PORTS, Pin};
+use super::circuit::{Circuit, Pin};
 use super::map::Block;
 use crate::finding::What;
+use crate::part::PORTS;
 use crate::periph::usart::{TxPin, Usart, Wire};
 use crate::peripheral::Peripheral;
 use crate::time::Time;

@@ -32,7 +32,7 @@ pub use codes::{kind, sub};
 pub use fetch::Fetcher;
 pub use scan::{Heard, Scan};
 pub use settings::{Priority, Setting, are_on, settings};
-pub(crate) use words::words;
+pub(crate) use words::{carried, words};
 
 /// Unit address of requests to all units.
 pub const ADDRESS: u8 = 0xFD;

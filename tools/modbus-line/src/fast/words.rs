@@ -1,12 +1,21 @@
 //! Describes messages in words, for people.
 
 use super::{FUNCTION, Packet, sub};
+use crate::Direction;
 use crate::adu::{Framing, bytes};
-use crate::decode;
 
-/// Describes a PDU of function 70. `request` is the PDU of the request before a reply. Returns `None` for an unknown
-/// sub-function, and when the form does not match it.
-pub fn words(pdu: &[u8], request: Option<&[u8]>) -> Option<String> {
+/// Returns the PDU that a message carries to or from the unit with a serial number.
+pub fn carried(pdu: &[u8]) -> Option<(Direction, &[u8])> {
+    match pdu {
+        [FUNCTION, sub::REQUEST, _, _, _, _, pdu @ ..] => Some((Direction::Request, pdu)),
+        [FUNCTION, sub::REPLY, _, _, _, _, pdu @ ..] => Some((Direction::Response, pdu)),
+        _ => None,
+    }
+}
+
+/// Describes a PDU of function 70, without what it carries. Returns `None` for an unknown sub-function, and when the form
+/// does not match it.
+pub fn words(pdu: &[u8]) -> Option<String> {
     let [FUNCTION, sub, data @ ..] = pdu else {
         return None;
     };
@@ -15,15 +24,8 @@ pub fn words(pdu: &[u8], request: Option<&[u8]>) -> Option<String> {
         (sub::CONTINUE_SCAN, []) => "continue scan".to_owned(),
         (sub::FOUND, [serial @ .., unit]) => format!("found {}, unit {unit}", hex(serial)?),
         (sub::NONE_LEFT, []) => "no unit is left".to_owned(),
-        (sub::REQUEST, _) => {
-            let (serial, pdu) = data.split_at_checked(4)?;
-            format!("for {}: {}", hex(serial)?, decode::request(pdu))
-        }
-        (sub::REPLY, _) => {
-            let (serial, pdu) = data.split_at_checked(4)?;
-            let asked = request.and_then(|request| request.get(6..));
-            format!("from {}: {}", hex(serial)?, decode::response(pdu, asked))
-        }
+        (sub::REQUEST, _) => format!("for {}", hex(data.get(..4)?)?),
+        (sub::REPLY, _) => format!("from {}", hex(data.get(..4)?)?),
         (sub::FETCH, [least, room, unit, flag]) => {
             let from = format!("fetch events from unit {least} on, {room} bytes");
             match unit {

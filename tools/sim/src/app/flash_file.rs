@@ -10,8 +10,6 @@ use std::path::{Path, PathBuf};
 
 use sim::Board;
 
-use super::bench::complain;
-
 /// The file, and which state of the flash it has.
 #[derive(Debug)]
 pub struct FlashFile {
@@ -20,7 +18,7 @@ pub struct FlashFile {
     /// [`sim::Chip::flash_changes`] of the contents; `None` if the file has not been written yet, or if the last
     /// attempt has failed.
     holds: Option<u64>,
-    /// The last write error that was reported.
+    /// The last write error.
     reported: Option<String>,
     /// A change that the start made to the firmware in the file, if a user might not expect the change.
     pub note: Option<&'static str>,
@@ -67,11 +65,10 @@ impl FlashFile {
         Ok((file, contents))
     }
 
-    /// Reports [`note`](Self::note) on stderr.
-    pub fn report_note(&self) {
-        if let Some(note) = self.note {
-            complain(&format!("{}: {note}", self.path.display()));
-        }
+    /// Returns what [`note`](Self::note) says of the file.
+    pub fn noted(&self) -> Option<String> {
+        let note = self.note?;
+        Some(format!("{}: {note}", self.path.display()))
     }
 
     /// Writes the file if the flash has changed since the last call.
@@ -92,15 +89,12 @@ impl FlashFile {
         Ok(())
     }
 
-    /// Does the same as [`keep`](Self::keep), but reports an error on stderr. The same error is not reported again and
-    /// again.
-    pub fn keep_or_report(&mut self, board: &Board) {
-        if let Err(what) = self.keep(board)
-            && self.reported.as_ref() != Some(&what)
-        {
-            complain(&what);
-            self.reported = Some(what);
-        }
+    /// Does the same as [`keep`](Self::keep). Returns an error, but not the same one again and again.
+    pub fn keep_or_report(&mut self, board: &Board) -> Option<String> {
+        let what = self.keep(board).err()?;
+        let is_new = self.reported.as_ref() != Some(&what);
+        self.reported = Some(what);
+        self.reported.clone().filter(|_| is_new)
     }
 
     fn replace(&self, contents: &[u8]) -> io::Result<()> {

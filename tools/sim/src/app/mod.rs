@@ -150,7 +150,8 @@ pub fn run(options: &Options) -> Result<(), String> {
         bench.scenario = scenario::Scenario::read(path, &bench.known())?;
     }
     let files = bench.units.iter().filter_map(|unit| unit.flash.as_ref());
-    files.for_each(FlashFile::report_note);
+    let notes = files.filter_map(FlashFile::noted);
+    notes.for_each(|note| bench::complain(&note));
     // An unwritable file is reported now, not when the firmware saves something.
     bench.write_flash()?;
     let (events, queue) = mpsc::channel();
