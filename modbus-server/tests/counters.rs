@@ -74,20 +74,6 @@ fn each_request_increments_the_right_counters() {
     assert_eq!(unit.counters(), expected, "a busy broadcast");
 }
 
-#[test]
-fn counters_wrap() {
-    let mut unit = unit();
-    for _ in 0..0x1_0002 {
-        unit.character(0, Faults::OVERRUN);
-        unit.pause();
-        unit.character(0, Faults::NONE);
-        assert_eq!(unit.silence(), None);
-        unit.must_answer();
-    }
-    let counters = unit.counters();
-    assert_eq!(counters.as_words(), [2, 2, 0, 2, 0, 0, 0, 2, 2]);
-}
-
 /// Returns a receiver that has detected its first silence and has no buffer.
 fn receiver() -> Receiver<'static> {
     let mut receiver = Receiver::rtu(UNIT, false);

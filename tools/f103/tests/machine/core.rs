@@ -234,23 +234,6 @@ fn systick_counts_hclk_and_wakes_the_core_on_the_right_cycle() {
 }
 
 #[test]
-fn dwt_does_not_count_without_trcena() {
-    let mut program = Asm::new();
-    program.store(DWT_CTRL, 1);
-    program.copy(DWT_CYCCNT, OUT);
-    program.store(DEMCR, 1 << 24);
-    program.copy(DWT_CTRL, OUT + 4);
-    program.store(DWT_CTRL, 1);
-    program.copy(DWT_CTRL, OUT + 8);
-    program.spin();
-    let mut chip = chip(program);
-    chip.step(60);
-    let ctrl = [1, 2].map(|n| out(&chip, n) & 1);
-    assert_eq!((out(&chip, 0), ctrl), (0, [0, 1]));
-    assert_eq!(findings(&chip), ["DWT written while DEMCR.TRCENA is clear"]);
-}
-
-#[test]
 fn dwt_counts_cycles_through_sleep() {
     let mut program = Asm::new();
     program.store(DEMCR, 1 << 24);

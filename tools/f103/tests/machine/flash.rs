@@ -2,34 +2,34 @@
 
 use f103::Time;
 use f103::chip::Config;
-use f103::periph::flash::{Durations, Torn};
+use f103::periph::flash::Torn;
 
 use super::asm::{Asm, When};
 use super::regs::*;
 use super::{chip_with, findings, out};
 
 /// Address of the page that the programs use: the last but one.
-const PAGE: u32 = 0x0801_F800;
-const OFFSET: usize = 0x1_F800;
+pub const PAGE: u32 = 0x0801_F800;
+pub const OFFSET: usize = 0x1_F800;
 
-fn unlock(program: &mut Asm) {
+pub fn unlock(program: &mut Asm) {
     program.store(FLASH_KEYR, 0x4567_0123);
     program.store(FLASH_KEYR, 0xCDEF_89AB);
 }
 
 /// Erases [`PAGE`]. The last instruction starts the erase.
-fn erase(program: &mut Asm) {
+pub fn erase(program: &mut Asm) {
     program.store(FLASH_CR, 2);
     program.store(FLASH_AR, PAGE);
     program.store(FLASH_CR, 0x42);
 }
 
 /// The eight instructions that the core may have fetched in advance. The next one waits for the end of the operation.
-fn wait(program: &mut Asm) {
+pub fn wait(program: &mut Asm) {
     (0..8).for_each(|_| program.nop());
 }
 
-fn program_half(program: &mut Asm, offset: u32, value: u32) {
+pub fn program_half(program: &mut Asm, offset: u32, value: u32) {
     program.store(FLASH_CR, 1);
     program.set(0, PAGE + offset);
     program.set(1, value);
@@ -241,27 +241,6 @@ fn power_cut_between_any_two_instructions_keeps_the_written_half_words() {
         // The flash refuses to program the same value again, so the rest is as the second run left it.
         assert_eq!(chip.flash()[OFFSET..OFFSET + 8], all, "after {cut}");
     }
-}
-
-#[test]
-fn durations_can_be_set_and_a_locked_flash_refuses_writes() {
-    let mut program = Asm::new();
-    program.store(FLASH_CR, 2);
-    program.store(FLASH_CR, 0x42);
-    unlock(&mut program);
-    erase(&mut program);
-    program.spin();
-    let mut chip = chip_with(&program.image(), filled());
-    chip.set_flash_durations(Durations {
-        erase: Time::from_ms(40),
-        ..Durations::default()
-    });
-    chip.run_until(Time::from_ms(42));
-    assert_eq!(chip.flash()[OFFSET], 0);
-    chip.run_until(Time::from_ms(43));
-    assert_eq!(chip.flash()[OFFSET], 0xFF);
-    assert_eq!(chip.flash_operations(), 1);
-    assert_eq!(findings(&chip), ["flash: FLASH_CR written while locked"; 2]);
 }
 
 #[test]

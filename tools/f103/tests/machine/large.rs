@@ -382,6 +382,17 @@ fn remapped_usart_sends_and_receives_at_its_new_pins_and_not_at_the_old_ones() {
 }
 
 #[test]
+fn receiver_whose_pin_is_an_output_is_reported() {
+    let bench = Bench {
+        tx: Some(Pin::new('A', 9)),
+        ..Bench::default()
+    };
+    let program = remapped(1, 4 << 24, Pin::new('A', 0));
+    let text = "USART1 receives, but its RX pin is not a digital input";
+    assert!(findings(&run_on(&STM32F103VC, program, bench)).contains(&text.to_owned()));
+}
+
+#[test]
 fn remap_to_missing_pins_and_remap_of_a_timer_are_findings() {
     let at = Pin::new('C', 10);
     for (part, mapr, what) in [

@@ -12,6 +12,7 @@ mod parts;
 #[allow(dead_code, reason = "the tests of boards use the other registers")]
 mod regs;
 mod resets;
+mod reuse;
 
 use asm::Asm;
 use f103::chip::Config;

@@ -1,11 +1,10 @@
 //! Resets and start-up: flags, the watchdog, the crystal, the power supply.
 
 use f103::Time;
-use f103::chip::Config;
 
 use super::asm::{Asm, When};
 use super::regs::*;
-use super::{START, chip, chip_with, findings, out};
+use super::{START, chip, findings, out};
 
 const POWER_ON: u32 = 0x0C00_0000;
 const PIN: u32 = 0x0400_0000;
@@ -28,25 +27,6 @@ fn wait_a_moment(program: &mut Asm) {
     program.set(6, 2_000);
     program.raw(0x42B7); // cmp r7, r6
     program.branch(When::NotEqual, top);
-}
-
-#[test]
-fn watchdog_settings_are_not_in_force_while_the_lsi_is_off() {
-    let mut program = Asm::new();
-    program.store(IWDG_KR, 0x5555);
-    program.store(IWDG_PR, 1);
-    wait_a_moment(&mut program);
-    program.copy(IWDG_SR, OUT);
-    program.store(IWDG_KR, 0xCCCC);
-    wait_a_moment(&mut program);
-    program.copy(IWDG_SR, OUT + 4);
-    program.spin();
-    let mut chip = chip(program);
-    chip.run_until(Time::from_ms(20));
-    assert_eq!([out(&chip, 0), out(&chip, 1)], [1, 0]);
-    let findings = findings(&chip);
-    assert_eq!(findings.len(), 1, "{findings:?}");
-    assert!(findings[0].contains("while the LSI is off"), "{findings:?}");
 }
 
 #[test]
@@ -143,25 +123,4 @@ fn power_cycle_loses_sram_and_sets_the_power_on_flag() {
     let count = chip.instructions();
     chip.run_for(Time::from_secs(1));
     assert_eq!(chip.instructions(), count);
-}
-
-#[test]
-fn factory_words_read_as_configured() {
-    let mut program = Asm::new();
-    program.copy(0x1FFF_F7E0, OUT);
-    program.copy(0x1FFF_F7E8, OUT + 4);
-    program.copy(0xE004_2000, OUT + 8);
-    program.copy(0xE000_ED00, OUT + 12);
-    program.spin();
-    let config = Config {
-        unique_id: *b"abcdefghijkl",
-        ..Config::default()
-    };
-    let mut chip = chip_with(&program.image(), config);
-    chip.step(60);
-    assert_eq!(out(&chip, 0) & 0xFFFF, 128);
-    assert_eq!(out(&chip, 1), u32::from_le_bytes(*b"abcd"));
-    assert_eq!(out(&chip, 2) & 0xFFF, 0x410);
-    assert_eq!(out(&chip, 3), 0x411F_C231);
-    assert_eq!(findings(&chip), [""; 0]);
 }

@@ -1,30 +1,22 @@
-//! Boards with programs written by hand: their wires, slots and radios.
+//! Boards with programs written by hand, where the images show less: an early driver, dividers, radios on one air.
 
 #[path = "../../../f103/tests/machine/asm.rs"]
 #[allow(dead_code, reason = "the tests of the core use all of the assembler")]
 mod asm;
 mod echo;
 mod fx3u;
-mod radio;
 mod radio_bus;
 #[path = "../../../f103/tests/machine/regs.rs"]
 #[allow(dead_code, reason = "the tests of the core use all of the registers")]
 mod regs;
-mod slots;
-mod wires;
 mod witness;
 
-use asm::Asm;
 use sim::{Board, Config, Image, Time};
 
 /// Time from power-on to the first instruction: the reset delay of the part.
 const START: Time = Time::from_us(2_500);
 
-/// Returns a board that runs `program`.
-fn board(program: Asm) -> Board {
-    board_with(&program.image(), Config::default())
-}
-
+/// Returns a board that runs a program.
 fn board_with(image: &Image, config: Config) -> Board {
     Board::new(image, config).expect("the program fits")
 }

@@ -4,7 +4,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-use super::{Running, connect, eventually, refused, state};
+use super::{Running, connect, eventually, state};
 
 /// A client of the line.
 struct Client {
@@ -65,17 +65,6 @@ fn no_virtual_time_passes_between_requests() {
         hello.starts_with("ok 501500.500 version=1 line=9600,8N2 "),
         "{hello}"
     );
-}
-
-#[test]
-fn line_option_sets_rate_and_format_of_the_client() {
-    for line_format in ["19200,7N2", "921600,7E1", "1200,8O1"] {
-        let (_running, line, http) = started(&["--line", line_format]);
-        let hello = Client::connect(&line).ask(b"hello 1\n");
-        assert!(hello.contains(&format!(" line={line_format} ")), "{hello}");
-        let (_, format) = line_format.split_once(',').unwrap();
-        assert_eq!(state(&http)["line"]["format"], format);
-    }
 }
 
 #[test]
@@ -219,12 +208,4 @@ fn signals_end_the_simulator_during_a_long_request() {
     let mut reply = String::new();
     let _ = client.stream.read_line(&mut reply);
     assert!(!reply.starts_with("ok "), "the request was over: {reply}");
-}
-
-#[test]
-fn endpoints_in_real_time_are_refused_together_with_the_exact_line() {
-    for other in ["--pty", "--tcp", "--gdb"] {
-        let arguments = ["--exact-line", "127.0.0.1:0", other, "127.0.0.1:0"];
-        refused(&arguments, &["--exact-line", other]);
-    }
 }

@@ -150,23 +150,6 @@ fn wrong_header_closes_the_connection_and_others_go_on() {
 }
 
 #[test]
-fn client_beyond_the_32nd_replaces_one_that_sends_nothing() {
-    let (_running, gateway, _) = silent();
-    let mut clients: Vec<_> = (0..32).map(|_| Client::connect(&gateway)).collect();
-    // Half of a request is no request.
-    clients[0].0.write_all(&[0, 1, 0, 0, 0]).unwrap();
-    for client in &mut clients[1..] {
-        assert_eq!(client.ask(250, READ), [0x83, 0x0A]);
-    }
-    let mut one_more = Client::connect(&gateway);
-    assert_eq!(one_more.ask(250, READ), [0x83, 0x0A]);
-    clients[0].assert_closed();
-    for client in &mut clients[1..] {
-        assert_eq!(client.ask(250, READ), [0x83, 0x0A]);
-    }
-}
-
-#[test]
 fn client_that_only_sends_gets_its_responses_before_the_connection_closes() {
     let (_running, gateway, _) = silent();
     let mut client = Client::connect(&gateway);
@@ -200,10 +183,6 @@ fn image(more: &[&str]) -> (Running, String, String) {
     ready(Running::start_firmware(&[&GATEWAY[..], more].concat()))
 }
 
-fn write(address: u16, value: u16) -> Vec<u8> {
-    [&[6][..], &address.to_be_bytes(), &value.to_be_bytes()].concat()
-}
-
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn unit_answers_through_the_gateway() {
@@ -235,26 +214,4 @@ fn unit_answers_through_the_gateway() {
         "a unit in recovery mode does not answer"
     );
     assert_eq!(state(&http)["line"]["tx_frames"], 21);
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn gateway_follows_the_unit_to_ascii_mode_and_another_rate() {
-    let (_running, gateway, http) = image(&[]);
-    let mut client = Client::connect(&gateway);
-    // KEY; BAUD; MODE; COMMAND: save, restart. MODE is only in force after the restart.
-    for (address, value) in [
-        (0x0100, 0x5A17),
-        (0x0101, 384),
-        (0x0103, 1),
-        (0x0108, 1),
-        (0x0108, 2),
-    ] {
-        let pdu = write(address, value);
-        assert_eq!(client.ask(1, &pdu), pdu, "{address:#06x}");
-    }
-    // The unit answers first, then restarts, and does not answer while it starts.
-    eventually("no answer in ASCII mode", || {
-        client.ask(1, &[3, 1, 3, 0, 1]) == [3, 2, 0, 1] && state(&http)["line"]["baud"] == 38_400
-    });
 }

@@ -30,17 +30,6 @@ fn slot_that_the_board_does_not_have_is_refused() {
 }
 
 #[test]
-fn a_board_with_several_slots_shows_them_over_http() {
-    let slots = ["--module", "4do", "--slot", "3=4ai"];
-    let mut running = Running::start_loop(&[&["--board", "modio-08"][..], &slots].concat());
-    running.line();
-    let http = running.endpoint("http: http://");
-    let state = state(&http);
-    let modules = [0, 1, 2, 3].map(|n| state["slots"][n]["module"].clone());
-    assert_eq!(modules, ["4do", "none", "4ai", "none"]);
-}
-
-#[test]
 fn without_pseudo_terminals_the_error_names_the_missing_option() {
     let mut bare = Command::new(env!("CARGO_BIN_EXE_modio-sim"));
     let output = bare.args(["--http", "127.0.0.1:0"]).output().unwrap();
@@ -209,16 +198,4 @@ fn assert_preset(board: &[&str], fitting: &[&str], name: &str, settings: &[(u16,
         fitted,
         "a preset does not change the stored configuration"
     );
-}
-
-#[test]
-fn a_wrong_option_is_refused() {
-    refused(&["--dip", "256"], &["--dip", "0..=255"]);
-    refused(&["--module", "4xx"], &["--module", "2ai2ao"]);
-    refused(&["--for", "ever"], &["--for"]);
-    refused(&["--line", "9600,7N1"], &["--line", "9600,7N2"]);
-    refused(&["--flash"], &["--flash"]);
-    refused(&["--unit", "5:8di"], &["--unit", "2ai2ao"]);
-    refused(&["--unit", "5", "--dip", "5"], &["--unit", "--dip"]);
-    refused(&["--bus", "/nowhere.toml"], &["/nowhere.toml", NO_FILE]);
 }

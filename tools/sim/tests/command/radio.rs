@@ -29,34 +29,6 @@ fn echoing(directory: &Path) -> String {
 }
 
 #[test]
-fn lora_excludes_the_exact_line_and_needs_a_link() {
-    let exact = ["--exact-line", "127.0.0.1:0", "--lora", "radio"];
-    refused(&exact, &["--exact-line", "--lora", "cannot be used with"]);
-    refused(&["--lora"], &["--lora <LINK>"]);
-}
-
-#[test]
-fn lora_is_refused_without_pseudo_terminals() {
-    if sim::options::PTY {
-        return;
-    }
-    let directory = tempfile::tempdir().unwrap();
-    let elf = echoing(directory.path());
-    refused(&["--elf", &elf, "--lora", "radio"], &["no --lora"]);
-}
-
-#[test]
-fn file_at_the_path_of_the_link_is_not_replaced() {
-    if !sim::options::PTY {
-        return;
-    }
-    let directory = tempfile::tempdir().unwrap();
-    let elf = echoing(directory.path());
-    let arguments = ["--elf", &elf, "--http", "127.0.0.1:0", "--lora", &elf];
-    refused(&arguments, &[&elf, "symlink"]);
-}
-
-#[test]
 fn gateway_is_the_last_endpoint_and_its_link_is_removed_at_the_end() {
     if !sim::options::PTY {
         return;
@@ -125,15 +97,4 @@ fn bytes_at_the_gateway_reach_the_board_and_its_answer_comes_back() {
         running.signal("-TERM");
         assert_eq!(running.end(), (Some(0), String::new()));
     }
-}
-
-#[test]
-fn radio_is_absent_without_the_option() {
-    let mut running = Running::start_loop(&[]);
-    running.line();
-    let http = running.endpoint("http: http://");
-    assert!(state(&http)["radio"].is_null());
-    assert!(get(&http, "/api/faults").get("radio_loss").is_none());
-    let refusal = post(&http, "/api/faults", r#"{"radio_loss":0.5}"#);
-    assert_eq!(refusal["error"], "the board has no LoRa module");
 }

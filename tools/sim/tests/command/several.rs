@@ -1,15 +1,13 @@
-//! Several boards, scenarios, faults and `--fixed-line` in the running command.
+//! Several boards, files of boards and scenarios, and `--fixed-line` in the running command.
 
 use std::fs;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::unit::{BAUD, COMMAND, KEY, Unit};
 use super::{ENDS, Running, endless_loop, eventually, get, post, refused, state};
 
 /// The module of the modio-02's only port.
 const MODULE: [u8; 5] = [3, 0x01, 0x14, 0, 1];
-/// Its four digital points.
-const INPUTS: [u8; 5] = [2, 0, 0x10, 0, 4];
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
@@ -62,30 +60,6 @@ fn bus_file_gives_each_board_a_name_and_a_flash() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_scenario_moves_inputs_in_virtual_time() {
-    let directory = tempfile::tempdir().unwrap();
-    let file = directory.path().join("day.toml");
-    let text = "[[step]]\nat = '1s'\nchannel = 2\nenergised = true\n";
-    fs::write(&file, text).unwrap();
-    let mut unit = Unit::start(&["--scenario", file.to_str().unwrap()]);
-    let begin = Instant::now();
-    let mut seen = Vec::new();
-    while seen.last() != Some(&0b0010) {
-        let before = state(&unit.http)["virtual_ms"].as_u64().unwrap();
-        let inputs = unit.ask_unit(1, &INPUTS, 3).unwrap()[2];
-        let after = state(&unit.http)["virtual_ms"].as_u64().unwrap();
-        if after < 1000 {
-            assert_eq!(inputs, 0, "{after} ms");
-        } else if before > 1100 {
-            assert_eq!(inputs, 0b0010, "{before} ms");
-        }
-        seen.push(inputs);
-        assert!(begin.elapsed() < Duration::from_secs(60), "{seen:?}");
-    }
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
 fn fixed_line_keeps_its_rate_when_the_unit_changes_its_own() {
     let mut unit = Unit::start(&["--fixed-line"]);
     assert_eq!(unit.rate(), 9600);
@@ -103,21 +77,6 @@ fn fixed_line_keeps_its_rate_when_the_unit_changes_its_own() {
     for _ in 0..3 {
         assert_eq!(unit.try_unit(1, &MODULE, 4), None);
     }
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn lost_requests_are_not_answered() {
-    let mut unit = Unit::start(&[]);
-    assert!(unit.ask_unit(1, &MODULE, 4).is_some());
-    let faults = post(&unit.http, "/api/faults", r#"{"drop_rate":1.0}"#);
-    assert_eq!(faults["drop_rate"], 1.0);
-    unit.line
-        .set_read_timeout(Some(Duration::from_millis(300)))
-        .unwrap();
-    assert_eq!(unit.try_unit(1, &MODULE, 4), None);
-    post(&unit.http, "/api/faults", r#"{"drop_rate":0.0}"#);
-    assert!(unit.ask_unit(1, &MODULE, 4).is_some());
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use modbus_line::adu::Framing;
 
-use super::{ENDS, Running, eventually, state};
+use super::{ENDS, Running, state};
 
 /// KEY, which opens the configuration's lock with 0x5A17.
 pub const KEY: u16 = 0x0100;
@@ -126,32 +126,4 @@ fn saved_configuration_survives_every_kind_of_end_of_the_simulator() {
     let mut unit = Unit::start(&option);
     assert_eq!(unit.read(FILTER), stored);
     unit.end(ENDS[0]);
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn without_a_flash_file_the_configuration_is_lost() {
-    let mut unit = Unit::start(&[]);
-    unit.save_filter(50);
-    drop(unit);
-    assert_eq!(Unit::start(&[]).read(FILTER), 5);
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn the_line_follows_the_unit_to_another_rate() {
-    let mut unit = Unit::start(&[]);
-    assert_eq!(unit.rate(), 9600);
-    unit.write(KEY, 0x5A17);
-    unit.write(BAUD, 1152);
-    unit.save();
-    assert_eq!(
-        unit.rate(),
-        9600,
-        "a new rate is in force after the next start"
-    );
-    unit.write(COMMAND, 2);
-    // The unit answers first, then restarts.
-    eventually("the line does not follow", || unit.rate() == 115_200);
-    assert_eq!(unit.read(BAUD), 1152);
 }

@@ -2,7 +2,6 @@
 
 use register_map::layout::HEADER;
 use register_map::part::FLASH_BASE;
-use register_map::state::{BUILD, FIRMWARE_PATCH, FIRMWARE_VERSION, version};
 use sim::{Config, Module, Time};
 
 use crate::LAYOUT;
@@ -34,15 +33,6 @@ fn unit_reports_the_commit_that_it_was_built_from() {
     let mut bench = Bench::new(Module::Do4, 1);
     let words = [0x020C, 0x020D].map(|address| u32::from(bench.register(address)));
     assert_eq!(words, [commit >> 16, commit & 0xFFFF]);
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn unit_reports_its_version_and_whether_it_is_a_release() {
-    let mut bench = Bench::new(Module::Do4, 1);
-    let numbers = [FIRMWARE_VERSION, FIRMWARE_PATCH].map(|address| bench.register(address));
-    let reported = version(numbers, bench.register(BUILD)).to_string();
-    assert_eq!(reported, env!("CARGO_PKG_VERSION"));
 }
 
 #[test]

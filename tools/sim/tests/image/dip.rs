@@ -63,20 +63,6 @@ fn switch_254_without_another_image_starts_the_one_there_is_as_unit_255() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn the_switch_is_read_only_at_power_on() {
-    let mut bench = Bench::new(Module::Di4, 17);
-    bench.board.set_dip(18);
-    bench.board.run_for(Time::from_secs(1));
-    bench.assert_answers(17);
-    assert_eq!(bench.ask(18, &[1, 0, FIRST, 0, 4]), None);
-    bench.board.cycle();
-    bench.board.run_for(START);
-    bench.assert_answers(18);
-    assert_eq!(bench.ask(17, &[1, 0, FIRST, 0, 4]), None);
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
 fn switch_that_bounces_at_power_on_is_read_once_it_is_stable() {
     let mut bench = Bench::cold(Config {
         dip: 17,

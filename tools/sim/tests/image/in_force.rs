@@ -1,5 +1,4 @@
-//! When a setting comes into force: settings of kind "restart" after the next start, settings of kind "now"
-//! immediately.
+//! FRAME_GAP on the timer of the line: in force after the restart, with the time that it says.
 
 use sim::{Module, Time};
 
@@ -7,7 +6,6 @@ use crate::bench::{Bench, FIRST, SLOT, adu};
 
 const BAUD: u16 = 0x0101;
 const FORMAT: u16 = 0x0102;
-const RESPONSE_DELAY: u16 = 0x0105;
 const FRAME_GAP: u16 = 0x0106;
 
 /// Returns the time from the end of the request to the start of the reply to a read.
@@ -61,20 +59,6 @@ fn longer_frame_gap_is_in_force_after_the_restart() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn shorter_frame_gap_is_in_force_after_the_restart() {
-    let mut bench = Bench::set_up(Module::Di4, &[(FRAME_GAP, 20)]);
-    // 2 ms at 9600: less than two characters.
-    assert_at(
-        turnaround(&mut bench),
-        Time::from_ms(2),
-        Time::from_us(60) + bench.bit(),
-    );
-    assert!(answered_with_gap(&mut bench, Time::from_us(1_800)));
-    assert!(!answered_with_gap(&mut bench, Time::from_us(2_300)));
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
 fn requests_are_answered_with_every_frame_gap() {
     for (baud, format, gap) in [
         (12, 0, 2),
@@ -96,29 +80,5 @@ fn requests_are_answered_with_every_frame_gap() {
         let shortest = Time::from_ps(bench.characters(3).as_ps() / 2);
         let (due, slack) = (gap.max(shortest), Time::from_us(60) + bench.bit() * 2);
         assert_at(turnaround(&mut bench), due, slack);
-    }
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn delayed_response_is_dropped_when_other_traffic_has_begun() {
-    let mut bench = Bench::set_up(Module::Di4, &[(RESPONSE_DELAY, 300)]);
-    let read = adu(&[1, 1, 0, FIRST, 0, 4]);
-    let others = adu(&[&[2, 3, 200], &[0x55; 200][..]].concat());
-    bench.patience = Time::from_ms(400);
-    for (other, from_ms, answered) in [
-        // Traffic that is still on the line when the delay ends; short invalid bytes; a valid frame that ends long
-        // before.
-        (&others[..], 200, false),
-        (&others[..30], 20, true),
-        (&adu(&[2, 1, 0, FIRST, 0, 4])[..], 20, false),
-    ] {
-        let now = bench.board.now();
-        let end = bench.board.line().send(now, &read);
-        let start = end + Time::from_ms(from_ms);
-        let end = bench.board.line().send(start, other);
-        let answers = !bench.answer_after(end).is_empty();
-        assert_eq!(answers, answered, "{} bytes", other.len());
-        bench.assert_answers(1);
     }
 }

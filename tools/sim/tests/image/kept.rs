@@ -1,44 +1,12 @@
 //! The kept region: a reset at any instruction of an update loses at most that update.
-//!
-//! A reset keeps the RAM, and a start reads nothing of it but this region. So it is enough to start the unit once with
-//! each content that the region has after some instruction.
 
 use sim::{Module, Time};
 
 use crate::bench::{Bench, SLOT, adu, symbol};
+use crate::kept_region::Contents;
 
 const PULSES: u16 = 0x0300 + 2 * SLOT;
 const FILTER: u16 = 0x0120 + SLOT;
-/// Bytes of the region, and of its end, which holds the marks of the tasks.
-const REGION: usize = 512;
-const MARKS: usize = 16;
-
-/// What the unit reports: pulses of the first input and the number of faults.
-type Reported = (u32, u16);
-
-fn range(bench: &Bench) -> std::ops::Range<usize> {
-    let end = bench.board.ram().len();
-    end - REGION..end - MARKS
-}
-
-/// Contents of the region, each with what the unit may report after it.
-struct Contents(Vec<(Vec<u8>, [Reported; 2])>);
-
-impl Contents {
-    /// Runs instructions one by one, while the reported values change from `old` to `new`.
-    fn collect(&mut self, bench: &mut Bench, instructions: u32, old: Reported, new: Reported) {
-        let range = range(bench);
-        let mut last = bench.board.ram()[range.clone()].to_vec();
-        for _ in 0..instructions {
-            bench.board.step(1);
-            let now = &bench.board.ram()[range.clone()];
-            if now != last {
-                last = now.to_vec();
-                self.0.push((last.clone(), [old, new]));
-            }
-        }
-    }
-}
 
 /// Sends a request and runs until shortly before the unit executes it: the end of the frame, or of the echo.
 fn send(bench: &mut Bench, pdu: &[u8], characters: u64) {
@@ -83,18 +51,11 @@ fn reset_at_any_instruction_of_an_update_loses_at_most_that_update() {
     send(&mut bench, &[16, 3, 32, 0, 2, 4, 0, 0, 0, 0], 0);
     contents.collect(&mut bench, 40_000, (2, 1), (0, 1));
     bench.started();
-    let mut seen = Vec::new();
-    for (n, (content, allowed)) in contents.0.iter().enumerate() {
-        let range = range(&bench);
-        bench.board.ram_mut()[range].copy_from_slice(content);
+    let seen = contents.play(&mut bench, |bench| {
         bench.board.reset();
         bench.started();
-        let found = (bench.long(PULSES), bench.register(0x0261));
-        let fits = allowed.contains(&found);
-        assert!(fits, "content {n}: {found:?}, not of {allowed:?}");
-        seen.push(found);
-    }
-    seen.dedup();
+        (bench.long(PULSES), bench.register(0x0261))
+    });
     assert!(
         seen.ends_with(&[(1, 0), (2, 0), (2, 1), (0, 1)]),
         "{seen:?}"

@@ -14,8 +14,8 @@
 //! | the description | `self_description` |
 //! | the line | `noise`, `pulses`, `timing`, `silences`, `dip`, `bus` |
 //! | points | `points`, `analog_inputs`, `analog_outputs`, `dac_faults`, `counters`, `edges` |
-//! | configuration | `in_force`, `storing`, `saving`, `save_budget`, `flash_faults`, `power_cut` |
-//! | the simulator | `cores`: boards of one process share translated code; `programmed`: loader and image in its flash |
+//! | configuration | `in_force`, `saving`, `flash_faults`, `power_cut` |
+//! | the simulator | `programmed`: loader and image in its flash |
 //! | the radio | `radio`, `air` |
 //! | the loader, and an update over the line | `loading`, `updating`, `campaign` |
 //! | the image without a loader, as on a Blue Pill | `alone` |
@@ -37,7 +37,6 @@ mod campaign;
 mod campaigns;
 mod clock;
 mod comm_watchdog;
-mod cores;
 mod counters;
 mod dac_faults;
 mod dip;
@@ -48,6 +47,7 @@ mod hung_task;
 mod in_force;
 mod in_slots;
 mod kept;
+mod kept_region;
 mod loading;
 mod log;
 mod long_run;
@@ -59,12 +59,10 @@ mod programmed;
 mod pulses;
 mod radio;
 mod registers;
-mod save_budget;
 mod saving;
 mod self_description;
 mod silences;
 mod stack;
-mod storing;
 mod timing;
 mod updating;
 mod upsets;

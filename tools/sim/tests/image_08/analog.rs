@@ -1,6 +1,6 @@
 //! Analog points of all slots: sixteen inputs of the converter, and four DACs on one bus.
 
-use register_map::configuration::{FILTER, SAFE, START};
+use register_map::configuration::FILTER;
 use sim::slot::BusFault;
 use sim::{Module, Time};
 
@@ -113,25 +113,4 @@ fn a_dac_that_does_not_answer_does_not_affect_the_other_slots() {
     assert_eq!(bench.registers(STATE, 4), Ok(vec![0; 4]));
     assert_eq!(bench.registers(8, 4), Ok(vec![500; 4]));
     assert_eq!(codes(&bench, 3), [500; 4]);
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn every_dac_starts_at_start_and_goes_to_safe() {
-    let mut settings: Vec<_> = (0..16).map(|point| (START + point, 1000 + point)).collect();
-    settings.extend((0..16).map(|point| (SAFE + point, 2000 + point)));
-    let mut bench = fitted([Module::Ao4; 4], &settings);
-    let expected = |first: u16, port: u8| {
-        let point = first + (u16::from(port) - 1) * 4;
-        [point, point + 1, point + 2, point + 3]
-    };
-    for port in 1..=4 {
-        assert_eq!(codes(&bench, port), expected(1000, port), "port {port}");
-    }
-    // COMM_TIMEOUT of 0.2 s.
-    bench.configure(0x0104, &[2]);
-    bench.board.run_for(Time::from_ms(400));
-    for port in 1..=4 {
-        assert_eq!(codes(&bench, port), expected(2000, port), "port {port}");
-    }
 }

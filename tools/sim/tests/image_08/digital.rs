@@ -1,8 +1,8 @@
 //! Digital points of all slots: each point is on a separate line.
 
-use sim::{Module, Time};
+use sim::{Channel, Module, Time};
 
-use crate::fitted::{LINES, change, fitted, outputs};
+use crate::fitted::{LINES, change, channels, fitted, outputs};
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
@@ -43,4 +43,18 @@ fn every_input_point_follows_its_own_line_and_no_other() {
         bench.board.run_for(Time::from_ms(10));
     }
     assert_eq!(bench.bits(2, 0, 16), Ok(vec![false; 16]));
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn relays_and_their_jumpers_work_beside_empty_slots() {
+    let plugged = [Module::None, Module::Relay2, Module::None, Module::None];
+    let mut bench = fitted(plugged, &[]);
+    change(&mut bench, 2, |slot| slot.set_manual(1, true)).unwrap();
+    bench.write_bits(6, &[false, true]).unwrap();
+    bench.board.run_for(Time::from_ms(50));
+    assert_eq!(bench.bits(1, 4, 4), Ok(vec![true, false, false, true]));
+    let relay = |energised, manual| Channel::Relay { energised, manual };
+    let relays = [relay(false, true), relay(true, false)];
+    assert_eq!(channels(&bench, 2)[..2], relays);
 }

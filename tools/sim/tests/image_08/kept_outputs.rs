@@ -13,6 +13,7 @@ use crate::LAYOUT;
 use crate::bench::{Bench, adu, file};
 use crate::fitted::{change, codes, fitted_with, outputs};
 use crate::in_slots::{APPLICATION, CHECK, runs_from, signed};
+use crate::kept_region::{Contents, region};
 
 const MODULES: [Module; 4] = [Module::Do4, Module::Di4, Module::Ao4, Module::None];
 /// An output with START = 0 that follows an input, and the input.
@@ -20,9 +21,6 @@ const HEATER: u16 = 3;
 const INPUT: u16 = 4;
 const ANALOG: u16 = 8;
 
-/// Bytes of the kept region, and of its end, which holds the marks of the tasks.
-const REGION: usize = 512;
-const MARKS: usize = 16;
 /// Words of a copy of the sealed part, and the words STARTED and OWNER.
 const COPY: usize = 16;
 const STARTED: usize = 9;
@@ -67,30 +65,6 @@ fn reset(bench: &mut Bench) {
     bench.board.run_for(Time::from_ms(250));
 }
 
-fn region(bench: &Bench) -> std::ops::Range<usize> {
-    let end = bench.board.ram().len();
-    end - REGION..end - MARKS
-}
-
-/// Contents of the region, each with the values that may follow.
-struct Contents(Vec<(Vec<u8>, [Values; 2])>);
-
-impl Contents {
-    /// Runs instructions one by one, while the outputs change from `old` to `new`.
-    fn collect(&mut self, bench: &mut Bench, instructions: u32, old: Values, new: Values) {
-        let range = region(bench);
-        let mut last = bench.board.ram()[range.clone()].to_vec();
-        for _ in 0..instructions {
-            bench.board.step(1);
-            let now = &bench.board.ram()[range.clone()];
-            if now != last {
-                last = now.to_vec();
-                self.0.push((last.clone(), [old, new]));
-            }
-        }
-    }
-}
-
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn reset_after_any_store_leaves_the_old_or_the_new_outputs() {
@@ -115,19 +89,10 @@ fn reset_after_any_store_leaves_the_old_or_the_new_outputs() {
     contents.collect(&mut bench, 60_000, old, new);
     bench.started();
     assert_eq!(values(&bench), new);
-    let mut seen = Vec::new();
-    for (n, (content, allowed)) in contents.0.iter().enumerate() {
-        let range = region(&bench);
-        bench.board.ram_mut()[range].copy_from_slice(content);
-        reset(&mut bench);
-        let found = values(&bench);
-        assert!(
-            allowed.contains(&found),
-            "store {n}: {found:?}, not of {allowed:?}"
-        );
-        seen.push(found);
-    }
-    seen.dedup();
+    let seen = contents.play(&mut bench, |bench| {
+        reset(bench);
+        values(bench)
+    });
     assert_eq!(seen, [old, new]);
 }
 

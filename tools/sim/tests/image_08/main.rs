@@ -1,9 +1,10 @@
 //! The release image of the modio-08 behind its loader, on the virtual board. `MODIO_IMAGES_MODIO_08`, which `cargo xtask
 //! test` sets, names the directory of loader and images.
 //!
-//! The tests of the four slots are in `slots`, `analog`, `digital` and `faults_of_slots`, those of function 70 in `fast`,
-//! those of links in `links`, of START = 0xFFFE in `as_it_was`. The other files are those of the modio-02's tests whose result depends on the board, with one
-//! module in the first slot: start, store, edges, timing, stack, the pins of the radio, and an update.
+//! The tests of the four slots are in `analog`, `digital` and `faults_of_slots`, those of function 70 in `fast`, those of
+//! links in `links`, of START = 0xFFFE in `as_it_was`. The other files are those of the modio-02's tests whose result
+//! depends on the board, with one module in the first slot: start, store, edges, timing, stack, the pins of the radio, and
+//! an update.
 
 use sim::board::{Layout, MODIO_08};
 
@@ -19,8 +20,6 @@ mod faults_of_slots;
 mod fitted;
 mod kept_outputs;
 mod links;
-mod links_played;
-mod slots;
 
 #[allow(dead_code, reason = "other tests of the modio-02 use the rest")]
 #[path = "../image/bench.rs"]
@@ -36,6 +35,8 @@ mod fast_master;
 #[allow(dead_code, reason = "other tests of the modio-02 use the rest")]
 #[path = "../image/in_slots.rs"]
 mod in_slots;
+#[path = "../image/kept_region.rs"]
+mod kept_region;
 #[path = "../image/power_cut.rs"]
 mod power_cut;
 #[allow(dead_code, reason = "the tests over the air use the rest")]

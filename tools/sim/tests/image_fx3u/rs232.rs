@@ -1,7 +1,7 @@
 //! The RS-232 socket: a second Modbus line with 9600 8N1.
 
 use register_map::codes::Baud;
-use register_map::configuration::{BAUD, BETA, COMMAND, KEY, LORA, OPENING_KEY, UNIT};
+use register_map::configuration::{BAUD, BETA, COMMAND, KEY, OPENING_KEY, UNIT};
 use register_map::name::UNIT_BY_SERIAL;
 use register_map::{second, state};
 use sim::Time;
@@ -11,11 +11,6 @@ use sim::line::{Format, Settings};
 use crate::bench::{Bench, START, adu};
 use crate::{board, set, unit, words};
 
-/// Rate and format of the socket.
-const SOCKET: Settings = Settings {
-    baud: 9600,
-    format: Format::N1,
-};
 /// Unit 1 reads three points, and the reply while X0 to X2 are off.
 const READ: [u8; 6] = [1, 2, 0, 0, 0, 3];
 const REPLY: [u8; 4] = [1, 2, 1, 0];
@@ -40,12 +35,11 @@ fn ask(bench: &mut Bench, request: &[u8]) -> Vec<u8> {
     reply
 }
 
-fn write(bench: &mut Bench, unit: u8, address: u16, value: u16) {
+fn write(bench: &mut Bench, address: u16, value: u16) {
     let [a, b] = address.to_be_bytes();
     let [c, d] = value.to_be_bytes();
-    let request = [unit, 6, a, b, c, d];
-    let expected = if unit == 0 { &[][..] } else { &request };
-    assert_eq!(ask(bench, &request), expected);
+    let request = [1, 6, a, b, c, d];
+    assert_eq!(ask(bench, &request), request);
 }
 
 /// A master that asks again as soon as it has a reply and a silence has passed.
@@ -150,9 +144,9 @@ fn save_while_both_masters_ask_loses_no_reply() {
     let mut socket = Master::new(&READ, &REPLY);
     // More saves than fit in a page, so that pages are erased.
     for beta in 3000..3020 {
-        write(&mut bench, 1, KEY, OPENING_KEY);
-        write(&mut bench, 1, BETA, beta);
-        write(&mut bench, 1, COMMAND, 1);
+        write(&mut bench, KEY, OPENING_KEY);
+        write(&mut bench, BETA, beta);
+        write(&mut bench, COMMAND, 1);
         poll(&mut bench, [&mut line, &mut socket], Time::from_ms(300));
     }
     // A reply waits for an erase, for up to 40 ms.
@@ -185,7 +179,7 @@ fn reply_begins_after_t35() {
 #[ignore = "needs the image: cargo xtask test"]
 fn frames_that_are_t35_apart_are_two_and_a_shorter_pause_ends_none() {
     let mut bench = unit(&[]);
-    write(&mut bench, 1, KEY, OPENING_KEY);
+    write(&mut bench, KEY, OPENING_KEY);
     let [a, b] = BETA.to_be_bytes();
     for n in 0..20 {
         // A broadcast, and a request that reads what it has written.
@@ -204,62 +198,13 @@ fn frames_that_are_t35_apart_are_two_and_a_shorter_pause_ends_none() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn damaged_frame_gets_silence_and_is_counted() {
-    let mut bench = unit(&[]);
-    let mut errors = 0;
-    let mut wrong_crc = adu(&READ);
-    wrong_crc[7] ^= 1;
-    assert_eq!(exchange(&mut bench, &wrong_crc), []);
-    errors += 1;
-    // A pause of t3.5 makes two frames, both damaged.
-    let now = bench.board.now();
-    let port = bench.board.rs232().unwrap();
-    let end = port.send(now, &adu(&READ)[..4]);
-    port.send(end + Time::from_us(5_100), &adu(&READ)[4..]);
-    bench.board.run_for(Time::from_ms(80));
-    assert_eq!(bench.board.rs232().unwrap().take_received(), []);
-    errors += 2;
-    // Stop bits are missing at half the rate.
-    let port = bench.board.rs232().unwrap();
-    port.set_settings(Settings {
-        baud: 4800,
-        ..SOCKET
-    });
-    exchange(&mut bench, &adu(&READ));
-    bench.board.rs232().unwrap().set_settings(SOCKET);
-    errors += 1;
-    assert_eq!(ask(&mut bench, &READ), REPLY);
-    let [a, b] = second::BUS_MESSAGES.to_be_bytes();
-    let reply = ask(&mut bench, &[1, 3, a, b, 0, 2]);
-    assert_eq!(reply, [1, 3, 4, 0, 2, 0, errors]);
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn function_70_is_exception_01_and_lora_does_not_exist() {
-    let mut bench = unit(&[]);
-    assert_eq!(ask(&mut bench, &[1, 0x46, 1]), [1, 0xC6, 1]);
-    for scan in [1, 2, 4, 8, 16] {
-        assert_eq!(ask(&mut bench, &[0xFD, 0x46, scan]), []);
-    }
-    let [a, b] = LORA.to_be_bytes();
-    assert_eq!(ask(&mut bench, &[1, 3, a, b, 0, 1]), [1, 0x83, 2]);
-    assert_eq!(ask(&mut bench, &[1, 6, a, b, 0, 1]), [1, 0x86, 2]);
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn settings_are_written_by_broadcast_and_a_restart_follows_its_whole_reply() {
+fn restart_follows_its_whole_reply() {
     let mut bench = unit(&[]);
     bench.tolerant = true;
-    write(&mut bench, 0, KEY, OPENING_KEY);
-    write(&mut bench, 0, BETA, 3021);
-    let [a, b] = BETA.to_be_bytes();
-    assert_eq!(bench.ask(1, &[3, a, b, 0, 1]).unwrap(), [3, 2, 0x0B, 0xCD]);
     for n in 1..=5 {
-        write(&mut bench, 1, KEY, OPENING_KEY);
+        write(&mut bench, KEY, OPENING_KEY);
         // Its reply, and no byte of the restart.
-        write(&mut bench, 1, COMMAND, 2);
+        write(&mut bench, COMMAND, 2);
         bench.board.run_for(Time::from_ms(200));
         assert_eq!(bench.board.resets(), n);
         assert_eq!(ask(&mut bench, &READ), REPLY);

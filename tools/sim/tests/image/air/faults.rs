@@ -61,30 +61,6 @@ fn module_that_is_removed_is_reported_and_the_next_one_is_set_up() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn lost_and_collided_packets_cost_their_requests_only() {
-    let mut bench = bench(&[]);
-    bench.air().set_loss(1.0);
-    assert_eq!(bench.ask_over_the_air(1, &[1, 0, FIRST, 0, 4]), None);
-    bench.air().set_loss(0.0);
-    bench.assert_answers_over_the_air();
-    // Another transmitter during the request.
-    let now = bench.board.now();
-    let parameters = bench.module().parameters();
-    bench
-        .air()
-        .transmit(now + Time::from_ms(30), parameters, &[0x55; 20]);
-    assert_eq!(bench.ask_over_the_air(1, &[1, 0, FIRST, 0, 4]), None);
-    bench.assert_answers_over_the_air();
-    // A frame of another protocol in front of a request.
-    let now = bench.board.now();
-    bench.air().transmit(now, parameters, b"hello");
-    bench.board.run_for(Time::from_ms(500));
-    bench.air().take_received();
-    bench.assert_answers_over_the_air();
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
 fn any_bit_of_the_uarts_registers_may_change_at_any_instant() {
     // RM0008 27.6. Each bit changes at one of five instants of a request and its reply.
     for (offset, bits) in [

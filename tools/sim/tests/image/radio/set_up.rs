@@ -1,7 +1,7 @@
 //! The set-up of the module: its settings, when they are written, and when the radio is off.
 
 use register_map::{
-    configuration::{COMMAND, LORA, LORA_ADDRESS, LORA_AIR_RATE, LORA_CHANNEL, LORA_POWER},
+    configuration::{LORA, LORA_ADDRESS, LORA_AIR_RATE, LORA_CHANNEL, LORA_POWER},
     second, state,
 };
 use sim::radio::{Mode, Parameters};
@@ -33,22 +33,6 @@ fn module_gets_the_stored_settings_and_requests_over_the_air_are_answered() {
     );
     assert!(bench.board.take_log().ends_with("radio: ready\n"));
     assert!(!bench.status(state::status::MODULE_FAULT));
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn settings_apply_after_a_save_and_a_restart() {
-    let mut bench = bench(&[]);
-    bench.tolerant = true;
-    bench.configure(LORA_CHANNEL, &[9]);
-    bench.configure(LORA_AIR_RATE, &[5]);
-    bench.save();
-    bench.assert_answers_over_the_air();
-    bench.unlock();
-    bench.write(COMMAND, &[2]).unwrap();
-    bench.board.run_for(SET_UP);
-    assert_eq!(bench.module().parameters().bytes()[2..4], [0x1D, 9]);
-    bench.assert_answers_over_the_air();
 }
 
 #[test]

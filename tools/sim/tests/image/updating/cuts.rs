@@ -95,19 +95,20 @@ fn recorded() -> (Vec<u8>, Vec<Change>) {
     (first, all)
 }
 
-/// `MODIO_CUTS` is the number of cuts, 200 without it; every change of the boot state and every erase is among them.
+/// Number of cuts. Every change of the boot state and every erase is among them.
+const CUTS: usize = 200;
+
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn a_power_cut_in_any_flash_operation_of_an_update_leaves_a_unit_that_serves() {
     let (mut flash, all) = recorded();
-    let cuts = std::env::var("MODIO_CUTS").map_or(200, |cuts| cuts.parse().unwrap());
     let boot = (LAYOUT.board.layout().boot.first - 0x0800_0000) as usize;
     let always = |change: &Change| match change {
         Change::Erased(_) => true,
         Change::Programmed(at, _) => *at >= boot,
     };
     let rare = all.iter().filter(|change| always(change)).count();
-    let step = (all.len() - rare) / usize::max(cuts, rare + 1).saturating_sub(rare).max(1);
+    let step = (all.len() - rare) / usize::max(CUTS, rare + 1).saturating_sub(rare).max(1);
     println!(
         "{} operations, {rare} of them each, of the others one in {step}",
         all.len()

@@ -61,25 +61,6 @@ fn confirmed_image_by_the_second_key_ends_the_first() {
     assert_eq!(bench.order(Command::GoBack), Ok(()));
 }
 
-/// Both pages of the boot state are lost.
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn first_start_takes_the_second_key_then_the_higher_epoch() {
-    let epoch = |image: &mut [u8]| image[6] = 1;
-    for (slots, starts, revoked) in [
-        ([signed_by(SECOND_KEY, 0, |_| {}), signed(1, epoch)], 0, 1),
-        ([image(0), signed(1, epoch)], 1, 0),
-    ] {
-        let mut bench = unit_of([&slots[0], &slots[1]]);
-        assert_eq!(runs_from(&mut bench), starts);
-        let floor = bench.records(status::FLOOR, 1)[0];
-        assert_eq!(
-            [floor, behind_the_images(&mut bench)[8]],
-            [starts as u16, revoked]
-        );
-    }
-}
-
 /// Each round writes the boot state three times.
 #[test]
 #[ignore = "needs the image: cargo xtask test"]

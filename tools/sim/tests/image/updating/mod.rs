@@ -21,9 +21,8 @@ use sim::{Module, Time};
 use crate::LAYOUT;
 use crate::bench::{Bench, PAGE_SIZE, SLOT, adu};
 use crate::in_slots::{
-    APPLICATION, CHECK, CRC, FIRST_KEY, HASH, LENGTH, SECOND_KEY, SIGNATURE, START, answers,
-    answers_as, fitted, flash, holding, image, number, runs_from, sign, signed, signed_by, unit,
-    with_crc,
+    APPLICATION, CHECK, CRC, FIRST_KEY, HASH, SECOND_KEY, SIGNATURE, START, answers, answers_as,
+    fitted, flash, holding, image, number, runs_from, sign, signed, signed_by, unit, with_crc,
 };
 use crate::saving::SLOWEST;
 
