@@ -263,12 +263,11 @@ impl Bench {
     /// Updates the flash files. Prints a write error on stderr.
     pub fn keep_flash(&mut self) {
         for (n, unit) in self.units.iter_mut().enumerate() {
-            let board = self.bus.board(n);
-            let error = unit
-                .flash
-                .as_mut()
-                .and_then(|file| file.keep_or_report(board));
-            error.iter().for_each(|error| complain(error));
+            if let Some(file) = &mut unit.flash
+                && let Some(error) = file.keep_or_report(self.bus.board(n))
+            {
+                complain(&error);
+            }
         }
     }
 
