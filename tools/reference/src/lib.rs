@@ -5,9 +5,11 @@
 //! - [`Receiver`] returns what a unit must have received, from all characters of a frame at its end.
 //! - [`Server`] serves requests for a [`Device`], and counts and logs them.
 //! - [`Unit`] combines both.
+//! - [`Modio`] has the points, registers and files of a modio. It is written from the register map, for tests of tools.
 
 mod device;
 mod frame;
+mod modio;
 mod receiver;
 pub mod server;
 mod serving;
@@ -18,6 +20,7 @@ pub use frame::{
     UNIT, ascii_frame, crc, frame, framed, judge_ascii, judge_rtu, lrc, pack, pdu, read_files,
     unframed, write_bits, write_files, write_then_read, write_words,
 };
+pub use modio::Modio;
 pub use receiver::{Closed, LineCounters, Mode, Receiver};
 pub use server::Server;
 pub use serving::answer;

@@ -1,97 +1,46 @@
-//! The part of a modio that the reference server does not have: points and registers by the register map, the lock, the
-//! communication watchdog and the commands. The module in its slot is a 2Relay: two inputs, two outputs.
+//! A modio with a fault. Around the modio of the reference, which is right, this changes requests, replies and state. The
+//! module in its slot is a 2Relay: two inputs, which are the relays' modes, and two outputs, the relays.
 
-use std::collections::BTreeMap;
+use std::ops::Range;
 use std::time::Duration;
 
 use modbus_line::LineFormat;
-use modbus_reference::Device;
-use modio_description::{Description, checksum, describe};
+use modbus_reference::Modio as Reference;
 use register_map::board::MODIO_02;
-use register_map::codes::{Baud, Command, Format, Mode};
-use register_map::edges::log;
-use register_map::points::{self, Kind};
-use register_map::{BLOCKS, Module, configuration as at, counters, rule_at, runs, state};
+use register_map::codes::{Baud, Format};
+use register_map::{Module, configuration as at, counters, points, runs, state};
 
 use super::modio_fault::ModioFault;
+use super::server::{set, word};
 
 type Answer = Result<Vec<u8>, u8>;
 
 /// The unit's address: that of most worked frames.
 pub const UNIT: u8 = 1;
 
-const MODULE: Module = Module::Relay2;
-/// The relays' modes, which are inputs, and the relays, which are outputs.
-const INPUTS: [bool; 2] = [true, false];
-const OUTPUT: u16 = FIRST + 2;
-/// The first point of the slot, port 5.
+/// The inputs are the points of port 5 in front of its outputs.
+const INPUTS: Range<u16> = FIRST..FIRST + 2;
 const FIRST: u16 = points::first(5);
-const OUTPUTS: usize = 2;
-/// The first address after all registers.
-const END: u16 = 0x0600;
-
-/// Reset causes: power-on or the software, and the pin.
-const POWER_ON: u16 = 0x30;
-const SOFTWARE: u16 = 0x28;
-
-/// Time that the lock stays open.
-const OPEN: Duration = Duration::from_secs(60);
-
-/// Saves that are left at the start. A unit that is tested was saved before, and the suite waits when none is left.
-const SAVES_LEFT: u8 = 5;
-/// Time after which one more save is possible.
-const SAVE_EVERY: Duration = Duration::from_secs(at::SAVE_EVERY_S as u64);
+const SECOND_OUTPUT: usize = FIRST as usize + 3;
 
 /// Time between two outputs that are set to SAFE, with [`ModioFault::SafeOneByOne`].
 const ONE_BY_ONE: Duration = Duration::from_millis(1);
 
-/// The points, registers and state of a modio.
+/// A modio with a fault, or without one.
 pub struct Modio {
     fault: Option<ModioFault>,
-    edited: BTreeMap<u16, u16>,
-    saved: BTreeMap<u16, u16>,
-    outputs: [bool; OUTPUTS],
-    now: Duration,
-    booted: Duration,
-    cause: u16,
-    open_until: Duration,
-    saves_left: u8,
-    /// When the number of saves left was last raised.
-    save_added: Duration,
-    /// The last valid request.
-    last: Duration,
-    /// When the watchdog tripped. The flag can remain set after the watchdog is no longer in force.
-    tripped: Option<Duration>,
-    flag: bool,
+    modio: Reference,
     last_command: u16,
-    /// The unit has to restart after the reply.
-    pub restart: bool,
 }
 
 impl Modio {
     pub fn new(fault: Option<ModioFault>) -> Self {
-        let mut settings = BTreeMap::new();
-        for rule in at::RULES {
-            let default = |address| (address, rule.default);
-            settings.extend(rule.addresses().map(default));
-        }
-        settings.insert(at::module_of(5), MODULE.code());
+        let mut modio = Reference::new(&MODIO_02, |_| Module::Relay2);
+        modio.bits[usize::from(INPUTS.start)] = true;
         Self {
             fault,
-            saved: settings.clone(),
-            edited: settings,
-            outputs: [false; OUTPUTS],
-            now: Duration::ZERO,
-            booted: Duration::ZERO,
-            cause: POWER_ON,
-            open_until: Duration::ZERO,
-            saves_left: SAVES_LEFT,
-            save_added: Duration::ZERO,
-            last: Duration::ZERO,
-            tripped: None,
-            flag: false,
+            modio,
             last_command: 0,
-            restart: false,
         }
     }
 
@@ -101,21 +50,16 @@ impl Modio {
 
     /// Starts the unit. Returns the rate and format in force.
     pub fn start(&mut self, at: Duration, power_on: bool) -> LineFormat {
-        self.edited.clone_from(&self.saved);
-        (self.booted, self.last, self.now) = (at, at, at);
-        self.cause = if power_on { POWER_ON } else { SOFTWARE };
-        (self.open_until, self.tripped, self.flag) = (Duration::ZERO, None, false);
-        self.restart = false;
-        if !self.has(ModioFault::KeepsOutputs) {
-            for (n, output) in (0..).zip(&mut self.outputs) {
-                *output = self.saved[&(at::START + OUTPUT + n)] == 1;
-            }
+        let bits = self.modio.bits;
+        self.modio.start(at, power_on);
+        if self.has(ModioFault::KeepsOutputs) {
+            self.modio.bits = bits;
         }
-        let mut baud = u32::from(self.saved[&at::BAUD]) * 100;
+        let mut baud = u32::from(self.modio.saved[&at::BAUD]) * 100;
         if baud == Baud::B230400.bits_per_second() && self.has(ModioFault::LacksARate) {
             baud = Baud::B115200.bits_per_second();
         }
-        let mut format = Format::from_code(self.saved[&at::FORMAT]).unwrap_or(Format::F8N2);
+        let mut format = Format::from_code(self.modio.saved[&at::FORMAT]).unwrap_or(Format::F8N2);
         if format == Format::F8O1 && self.has(ModioFault::OddIsEven) {
             format = Format::F8E1;
         }
@@ -123,282 +67,156 @@ impl Modio {
         LineFormat::new(baud, name.parse().unwrap())
     }
 
+    /// Restarts the unit if a command was to do so. Returns the rate and format in force.
+    pub fn restart(&mut self, at: Duration) -> Option<LineFormat> {
+        self.modio.restart.then(|| self.start(at, false))
+    }
+
     /// Silence before a reply, in addition to t3.5.
     pub fn response_delay(&self) -> Duration {
         if self.has(ModioFault::RepliesUndelayed) {
             return Duration::ZERO;
         }
-        Duration::from_millis(self.edited[&at::RESPONSE_DELAY].into())
+        Duration::from_millis(self.modio.edited[&at::RESPONSE_DELAY].into())
     }
 
-    /// Notes a valid request for this unit, or a broadcast, at this instant. COMM_SOURCE has no effect.
+    /// Notes a valid request for this unit, or a broadcast, at this instant.
     pub fn request(&mut self, at: Duration, broadcast: bool, pdu: &[u8]) {
-        self.now = at;
-        let timeout = Duration::from_millis(100) * u32::from(self.edited[&at::COMM_TIMEOUT]);
-        let dead = !timeout.is_zero() && at > self.last + timeout;
-        if dead && self.tripped.is_none() && !self.has(ModioFault::WatchdogSleeps) {
-            self.tripped = Some(self.last + timeout);
-            self.flag = true;
-        }
-        if let Some(tripped) = self.tripped {
-            let each = if self.has(ModioFault::SafeOneByOne) {
-                ONE_BY_ONE
-            } else {
-                Duration::ZERO
-            };
-            for (n, output) in (0_u16..).zip(&mut self.outputs) {
-                let safe = self.edited[&(at::SAFE + OUTPUT + n)];
-                if safe != at::HOLD && at >= tripped + each * u32::from(n) {
-                    *output = safe == 1;
-                }
+        if self.has(ModioFault::WatchdogSleeps) {
+            self.modio.now = at;
+        } else {
+            let before = self.modio.bits[SECOND_OUTPUT];
+            self.modio.watch(at);
+            let tripped = self.modio.tripped;
+            let now = tripped.is_some_and(|tripped| at < tripped + ONE_BY_ONE);
+            if now && self.has(ModioFault::SafeOneByOne) {
+                self.modio.bits[SECOND_OUTPUT] = before;
             }
         }
-        let is_heartbeat = pdu.starts_with(&[6, 1, 0x0C]);
+        let is_heartbeat = pdu[0] == 6 && word(pdu, 1) == at::HEARTBEAT;
         if !(broadcast && self.has(ModioFault::BroadcastsAreNoLife)
             || is_heartbeat && self.has(ModioFault::HeartbeatsAreNoLife))
         {
-            self.last = at;
+            self.modio.note_request();
         }
     }
 
     /// Handles a request with a function code of 80 or above.
     pub fn odd_request(&mut self) {
         if self.has(ModioFault::RestartsByOddFrames) {
-            self.start(self.now, false);
+            self.start(self.modio.now, false);
         }
     }
 
     /// Serves a PDU; `None` when the function is not about points, registers or files.
     pub fn answer(&mut self, pdu: &[u8], counters: &[u16; 9]) -> Option<Answer> {
-        match pdu[0] {
-            1..=6 | 0x0F | 0x10 | 0x16 | 0x17 => Some(self.points(pdu, counters)),
-            0x14 | 0x15 => Some(self.files(pdu)),
-            _ => None,
-        }
-    }
-
-    /// Serves file 1, the self-description, and file 3, the log of edges, which is empty. Without a loader there is no
-    /// file 2.
-    fn files(&self, pdu: &[u8]) -> Answer {
-        let mut pdu = pdu.to_vec();
-        if pdu[0] == 0x15 && self.has(ModioFault::EchoesFileWrites) {
-            return Ok(pdu[1..].to_vec());
-        }
-        let file = description().file();
-        let mut words: Vec<u16> = file
-            .as_chunks()
-            .0
-            .iter()
-            .copied()
-            .map(u16::from_be_bytes)
-            .collect();
-        if self.has(ModioFault::ReadsBeyondTheFile) {
-            words.push(0);
-        }
-        if self.has(ModioFault::RefusesLongestGroup) && pdu.get(7..9) == Some(&[0, 124]) {
-            return Err(3);
-        }
-        if self.has(ModioFault::RepeatsFirstGroup) && pdu.len() > 9 {
-            let (first, others) = pdu[2..].split_at_mut(7);
-            others
-                .chunks_exact_mut(7)
-                .for_each(|group| group[3..5].copy_from_slice(&first[3..5]));
-        }
-        let mut device = Device {
-            files: vec![words, Vec::new(), vec![0; log::END.into()]],
-            read_only_from: 0,
-            ..Device::new(0, 0)
-        };
-        let reply = modbus_reference::answer(&mut device, &pdu)?;
-        Ok(reply[1..].to_vec())
-    }
-
-    fn points(&mut self, pdu: &[u8], counters: &[u16; 9]) -> Answer {
-        let points = [&[false; FIRST as usize][..], &INPUTS, &self.outputs].concat();
-        let words = (0..END).map(|address| self.value(address, counters));
-        let words: Vec<u16> = words.collect();
-        let mut device = Device {
-            bits: points.clone(),
-            input_bits: points,
-            words: words.clone(),
-            input_words: words,
-            max_word: u16::MAX,
-            ..Device::new(0, 0)
-        };
-        if self.has(ModioFault::InputsBy02Only) {
-            device.bits[usize::from(FIRST)..usize::from(OUTPUT)].fill(false);
-        }
-        if self.has(ModioFault::HidesFrom04) {
-            device.input_words[usize::from(at::BAUD)] = 0;
-        }
-        let reply = modbus_reference::answer(&mut device, pdu)?;
-        let word = |at: usize| u16::from_be_bytes([pdu[at], pdu[at + 1]]);
-        let (start, count) = match pdu[0] {
-            5 | 6 | 0x16 => (word(1), 1),
-            0x17 => (word(5), word(7)),
-            _ => (word(1), word(3)),
-        };
-        let written = usize::from(start)..usize::from(start) + usize::from(count);
-        match pdu[0] {
-            1 | 2 if start < FIRST => return Err(2),
-            1 | 2 => {}
-            3 | 4 => can_read(start, count)?,
-            5 | 0x0F => self.write_bits(start, &device.bits[written])?,
-            0x17 => {
-                can_read(word(1), word(3))?;
-                self.write(start, &device.words[written])?;
-                return self.points(&[&[3], &pdu[1..5]].concat(), counters);
+        let mut request = pdu.to_vec();
+        let mut counters = *counters;
+        let address = word(pdu, 1);
+        let open_until = self.modio.open_until;
+        match (self.fault, pdu[0]) {
+            (Some(ModioFault::EchoesFileWrites), 0x15) => return Some(Ok(request)),
+            (Some(ModioFault::RefusesLongestGroup), 0x14) if word(pdu, 7) == 124 => {
+                return Some(Err(3));
             }
-            _ => self.write(start, &device.words[written])?,
-        }
-        Ok(reply[1..].to_vec())
-    }
-
-    fn value(&self, address: u16, counters: &[u16; 9]) -> u16 {
-        const SLOT_MODULE: u16 = state::MODULE_IN_FORCE + 4;
-        let open = self.now < self.open_until;
-        let uptime = (self.now - self.booted).as_secs() as u32;
-        match address {
-            at::KEY => u16::from(open),
-            at::COMMAND if self.has(ModioFault::CommandReadsBack) => self.last_command,
-            at::COMMAND => 0,
-            0x0200 => (state::PRODUCT >> 16) as u16,
-            0x0201 => state::PRODUCT as u16,
-            state::UNIT_ADDRESS => UNIT.into(),
-            state::RESET_CAUSE => self.cause,
-            0x0208 => (uptime >> 16) as u16,
-            0x0209 => uptime as u16,
-            state::STATUS => {
-                let flags = [
-                    (state::status::COMM_WATCHDOG, self.flag),
-                    (state::status::UNSAVED, self.edited != self.saved),
-                    (state::status::UNLOCKED, open),
-                ];
-                flags.iter().map(|(bit, set)| bit * u16::from(*set)).sum()
+            (Some(ModioFault::RepeatsFirstGroup), 0x14) if pdu.len() > 9 => {
+                let (first, others) = request[2..].split_at_mut(7);
+                let others = others.chunks_exact_mut(7);
+                others.for_each(|group| group[3..5].copy_from_slice(&first[3..5]));
             }
-            SLOT_MODULE => MODULE.code(),
-            state::BUILD => state::build::NO_LOADER,
-            state::DESCRIPTION_CRC if self.has(ModioFault::StaleDescriptionCrc) => 0x1234,
-            state::DESCRIPTION_CRC => checksum(&description().encode()),
-            state::BUS_MESSAGES..state::T15_GAPS => {
-                let lag = u16::from(self.has(ModioFault::RegistersLag));
-                counters[usize::from(address - state::BUS_MESSAGES)].wrapping_sub(lag)
+            (Some(ModioFault::RegistersLag), _) => {
+                counters = counters.map(|counter| counter.wrapping_sub(1));
             }
-            _ => self.edited.get(&address).copied().unwrap_or(0),
-        }
-    }
-
-    fn write_bits(&mut self, start: u16, bits: &[bool]) -> Result<(), u8> {
-        let inputs = FIRST..OUTPUT;
-        if inputs.contains(&start) && self.has(ModioFault::EchoesInputs) {
-            return Ok(());
-        }
-        let from = usize::from(start.checked_sub(OUTPUT).ok_or(2)?);
-        let outputs = self.outputs.get_mut(from..from + bits.len()).ok_or(2)?;
-        outputs.copy_from_slice(bits);
-        self.tripped = None;
-        Ok(())
-    }
-
-    fn write(&mut self, start: u16, words: &[u16]) -> Result<(), u8> {
-        let count = words.len() as u16;
-        if runs(counters::RULES, start, count).is_some() {
-            let whole = start.is_multiple_of(2) && count.is_multiple_of(2);
-            let zero = words.iter().all(|word| *word == 0);
-            let right = whole || self.has(ModioFault::ClearsHalfCounters);
-            return if right && zero { Ok(()) } else { Err(3) };
-        }
-        let echoes = self.has(ModioFault::EchoesStateWrites);
-        if echoes && runs(state::RULES, start, count).is_some() {
-            return Ok(());
-        }
-        runs(at::RULES, start, count).ok_or(2)?;
-        if (start, count) == (at::HEARTBEAT, 1) && !self.has(ModioFault::LocksHeartbeat) {
-            return Ok(());
-        }
-        let locked = self.now >= self.open_until && (start, count) != (at::KEY, 1);
-        let locked = locked && !self.has(ModioFault::NoLock);
-        if locked && self.has(ModioFault::LockFirst) {
-            return Err(6);
-        }
-        for (address, value) in (start..).zip(words) {
-            if !self.allows(address, *value) {
-                return Err(3);
+            (Some(ModioFault::AnyKey), 6) if address == at::KEY => {
+                set(&mut request, 3, at::OPENING_KEY);
             }
-            if self.has(ModioFault::WritesUpToTheBadOne) && !locked {
-                self.edited.insert(address, *value);
+            (Some(ModioFault::AnyBaud), 6) if address == at::BAUD => set(&mut request, 3, 96),
+            (Some(ModioFault::AnyBaud), 0x10) if address == at::BAUD => set(&mut request, 6, 96),
+            (Some(ModioFault::LocksHeartbeat), 6)
+                if address == at::HEARTBEAT && !self.modio.is_open() =>
+            {
+                return Some(Err(6));
             }
-        }
-        let pair = |address: u16| {
-            let new = usize::from(address.wrapping_sub(start));
-            words.get(new).copied().unwrap_or(self.edited[&address])
-        };
-        let mode = Mode::from_code(pair(at::MODE)).unwrap_or(Mode::Rtu);
-        let format = Format::from_code(pair(at::FORMAT));
-        if format.is_some_and(|format| !format.suits(mode)) {
-            return Err(3);
-        }
-        while self.saves_left < at::SAVES && self.now >= self.save_added + SAVE_EVERY {
-            self.saves_left += 1;
-            self.save_added += SAVE_EVERY;
-        }
-        let order = words.get(usize::from(at::COMMAND.wrapping_sub(start)));
-        let saves = order == Some(&Command::Save.code()) && self.edited != self.saved;
-        if locked || saves && self.saves_left == 0 {
-            return Err(6);
-        }
-        if saves {
-            self.saves_left -= 1;
-        }
-        self.open_until = self.now + OPEN;
-        for (address, value) in (start..).zip(words) {
-            match address {
-                at::KEY | at::HEARTBEAT => {}
-                at::COMMAND => self.command(*value),
-                _ => drop(self.edited.insert(address, *value)),
-            }
-        }
-        Ok(())
-    }
-
-    fn allows(&self, address: u16, value: u16) -> bool {
-        if address == at::KEY && self.has(ModioFault::AnyKey)
-            || address == at::BAUD && self.has(ModioFault::AnyBaud)
-        {
-            return true;
-        }
-        // Ports 1 to 8; only port 5 has a slot.
-        if (at::MODULE..at::MODULE + 8).contains(&address) && address != at::module_of(5) {
-            return value == 0;
-        }
-        let kind = match at::point_of(address) {
-            Some(point) if (OUTPUT..OUTPUT + 2).contains(&point) => Kind::BitOutput,
-            Some(point) if (FIRST..OUTPUT).contains(&point) => Kind::BitInput,
-            _ => Kind::None,
-        };
-        rule_at(at::RULES, address).is_some_and(|(rule, _)| rule.values_for(kind).allow(value))
-    }
-
-    fn command(&mut self, code: u16) {
-        self.last_command = code;
-        match Command::from_code(code) {
-            Some(Command::Save) => self.saved.clone_from(&self.edited),
-            Some(Command::Restart) => self.restart = true,
-            Some(Command::DropChanges) => self.edited.clone_from(&self.saved),
-            Some(Command::ClearWatchdogFlag) => self.flag = false,
+            (Some(ModioFault::NoLock), 5..) => self.modio.open_until = Duration::MAX,
             _ => {}
         }
+        let answer = self.modio.answer(&request, &counters)?;
+        if self.modio.open_until == Duration::MAX {
+            self.modio.open_until = open_until;
+        }
+        if pdu[0] == 6 && address == at::COMMAND && answer.is_ok() {
+            self.last_command = word(pdu, 3);
+        }
+        Some(self.spoil(pdu, answer))
+    }
+
+    /// Returns the answer of the fault, from the right one.
+    fn spoil(&mut self, pdu: &[u8], answer: Answer) -> Answer {
+        let Some(fault) = self.fault else {
+            return answer;
+        };
+        let address = word(pdu, 1);
+        let count = if pdu[0] == 6 { 1 } else { word(pdu, 3) };
+        let data = pdu.get(if pdu[0] == 6 { 3 } else { 6 }..).unwrap_or(&[]);
+        let echo = || Ok(pdu[..5].to_vec());
+        match (fault, pdu[0], answer) {
+            (ModioFault::InputsBy02Only, 1, Ok(mut reply)) => {
+                for input in INPUTS {
+                    if let Some(at) = input.checked_sub(address).filter(|at| *at < count) {
+                        reply[2 + usize::from(at) / 8] &= !(1 << (at % 8));
+                    }
+                }
+                Ok(reply)
+            }
+            (ModioFault::HidesFrom04, 4, Ok(reply)) => Ok(with(reply, address, at::BAUD, 0)),
+            (ModioFault::StaleDescriptionCrc, 3 | 4, Ok(reply)) => {
+                Ok(with(reply, address, state::DESCRIPTION_CRC, 0x1234))
+            }
+            (ModioFault::CommandReadsBack, 3 | 4, Ok(reply)) => {
+                Ok(with(reply, address, at::COMMAND, self.last_command))
+            }
+            (ModioFault::ReadsBeyondTheFile, 0x14, Err(2)) => {
+                let words = vec![0; 2 * usize::from(word(pdu, 7))];
+                let length = words.len() as u8;
+                Ok([&[0x14, length + 2, length + 1, 6], &words[..]].concat())
+            }
+            (ModioFault::EchoesInputs, 5 | 0x0F, Err(2)) if INPUTS.contains(&address) => echo(),
+            (ModioFault::EchoesStateWrites, 6 | 0x10, Err(2))
+                if runs(state::RULES, address, count).is_some() =>
+            {
+                echo()
+            }
+            (ModioFault::ClearsHalfCounters, 6 | 0x10, Err(3))
+                if runs(counters::RULES, address, count).is_some()
+                    && data.iter().all(|byte| *byte == 0) =>
+            {
+                echo()
+            }
+            (ModioFault::AnyKey, 6, Ok(_)) => echo(),
+            (ModioFault::AnyBaud, 6 | 0x10, Ok(_)) if address == at::BAUD => {
+                self.modio.edited.insert(at::BAUD, word(data, 0));
+                echo()
+            }
+            (ModioFault::LockFirst, 6 | 0x10, Err(3)) if !self.modio.is_open() => Err(6),
+            (ModioFault::WritesUpToTheBadOne, 0x10, Err(3)) if self.modio.is_open() => {
+                for (address, pair) in (address..).zip(data.chunks_exact(2)) {
+                    let value = word(pair, 0);
+                    if !self.modio.allows(address, value) {
+                        break;
+                    }
+                    self.modio.edited.insert(address, value);
+                }
+                Err(3)
+            }
+            (_, _, answer) => answer,
+        }
     }
 }
 
-/// The self-description of the unit.
-fn description() -> Description {
-    describe(&MODIO_02, "0.1.0", |_| MODULE)
-}
-
-/// Checks that these registers are in one block.
-fn can_read(start: u16, count: u16) -> Result<(), u8> {
-    let blocks = BLOCKS.iter().skip(1);
-    let mut found = blocks.filter_map(|block| runs(block.rules, start, count));
-    found.next().map(|_| ()).ok_or(2)
+/// Returns the reply to a read of registers from `start` on, with another value of one register.
+fn with(mut reply: Vec<u8>, start: u16, register: u16, value: u16) -> Vec<u8> {
+    if let Some(at) = register.checked_sub(start) {
+        set(&mut reply, 2 + 2 * usize::from(at), value);
+    }
+    reply
 }

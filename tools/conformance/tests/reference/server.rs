@@ -178,7 +178,7 @@ impl Server {
     fn answer(&mut self, reference: &mut Reference, pdu: &[u8]) -> Answer {
         let of_modio = self.modio.as_mut();
         let answer = match of_modio.and_then(|modio| modio.answer(pdu, &reference.counters)) {
-            Some(answer) => answer,
+            Some(answer) => return answer,
             None if matches!(pdu[0], 7 | 8 | 0x0B | 0x0C | 0x11) => return reference.answer(pdu),
             None => self.serve(&mut reference.device, pdu),
         };
@@ -401,13 +401,13 @@ fn table(function: u8) -> (u16, usize) {
 }
 
 /// The word at a place of a request; 0 if the request is shorter.
-fn word(pdu: &[u8], at: usize) -> u16 {
+pub fn word(pdu: &[u8], at: usize) -> u16 {
     pdu.get(at..at + 2)
         .map_or(0, |pair| u16::from_be_bytes([pair[0], pair[1]]))
 }
 
 /// Replaces the word at a place of a request, if there is one.
-fn set(request: &mut [u8], at: usize, value: u16) {
+pub fn set(request: &mut [u8], at: usize, value: u16) {
     if let Some(pair) = request.get_mut(at..at + 2) {
         pair.copy_from_slice(&value.to_be_bytes());
     }

@@ -409,8 +409,9 @@ impl Unit {
 
     /// Restarts a modio after the command to restart.
     fn restart(&mut self, at: Duration) {
-        if let Some(modio) = self.server.modio.as_mut().filter(|modio| modio.restart) {
-            self.line = modio.start(at, false);
+        let modio = self.server.modio.as_mut();
+        if let Some(line) = modio.and_then(|modio| modio.restart(at)) {
+            self.line = line;
         }
     }
 
