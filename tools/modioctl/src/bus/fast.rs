@@ -10,8 +10,9 @@ use modbus_line::port::is_pseudo_terminal;
 use tokio::time::Instant;
 
 use super::adu::Framing;
+use super::answer::{Lost, MOST};
 use super::endpoint::{Endpoint, Place};
-use super::master::{Lost, MOST, Master};
+use super::master::Master;
 use crate::failure::Failure;
 
 /// Longest time for which an adapter holds bytes back.

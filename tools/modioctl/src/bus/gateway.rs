@@ -4,29 +4,14 @@ use std::io;
 use std::time::Duration;
 
 use super::Found;
-use super::master::{Lost, MOST, Master, PROBE};
+use super::answer::{Lost, MOST, PROBE, is_busy};
+use super::master::Master;
 
 /// Number of time-outs for which late answers are waited for at the end of a sweep.
 const BACKLOG: u32 = 3;
 
 /// Largest number of addresses without a unit that are asked again. Each can cost the gateway some seconds.
 const FEW: usize = 32;
-
-/// Returns whether an exception is the answer of a gateway for a unit that does not answer it (V1.1b3 chapter 7, codes
-/// 0A and 0B).
-pub const fn is_from_gateway(code: u8) -> bool {
-    matches!(code, 0x0A | 0x0B)
-}
-
-/// Returns whether an answer to a read is exception 05 or 06: the unit, or a gateway, has no time for it now. To a write
-/// these exceptions can mean more.
-pub const fn is_busy(pdu: &[u8], answer: &[u8]) -> bool {
-    let is_read = matches!(
-        pdu,
-        [0x01..=0x04 | 0x07 | 0x0B | 0x0C | 0x11 | 0x14 | 0x18, ..] | [0x2B, 0x0E, ..]
-    );
-    is_read && matches!(answer, [0x80..=0xFF, 5 | 6])
-}
 
 /// Returns a time-out in seconds for a gateway that took this time for an answer.
 pub fn sufficient(time: Duration) -> u64 {
@@ -99,18 +84,5 @@ impl Found {
             Err(Lost::Broken(error)) => return Err(error),
         }
         Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn only_a_read_can_be_repeated_while_the_unit_is_busy() {
-        assert!(is_busy(&[3, 0, 0, 0, 1], &[0x83, 6]));
-        assert!(is_busy(&[0x2B, 0x0E, 1, 0], &[0xAB, 5]));
-        assert!(!is_busy(&[6, 1, 0, 0, 1], &[0x86, 6]), "a write");
-        assert!(!is_busy(&[3, 0, 0, 0, 1], &[0x83, 2]));
     }
 }

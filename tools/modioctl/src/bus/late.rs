@@ -6,23 +6,18 @@
 //! older answer follows it.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::io;
 use std::time::Duration;
 
 use tokio::time::Instant;
 
 use super::Waiting;
 use super::adu::Framing;
-use super::master::{Lost, MOST, Master};
 
 /// Time after a time-out from which an answer is no longer expected.
 const LATEST: Duration = Duration::from_secs(20);
 
 /// Largest number of requests that are remembered.
 const REMEMBERED: usize = 256;
-
-/// Number of time-outs for which a unit without function 08 must be silent. Its answer may take almost two.
-const QUIET: u32 = 2;
 
 /// Longest time to wait for a late gateway, in time-outs.
 const MOST_PATIENCE: u32 = 4;
@@ -91,8 +86,18 @@ impl Late {
         self.has_08.insert(unit, true);
     }
 
+    /// Returns whether this unit has function 08, if that is known.
+    pub fn has_08(&self, unit: u8) -> Option<bool> {
+        self.has_08.get(&unit).copied()
+    }
+
+    /// Returns the time of the last late answer.
+    pub const fn answered(&self) -> Option<Instant> {
+        self.answered
+    }
+
     /// Forgets what this unit owes.
-    fn forget(&mut self, unit: u8) {
+    pub fn forget(&mut self, unit: u8) {
         self.owed.retain(|owed| owed.unit != unit);
     }
 
@@ -159,95 +164,8 @@ impl Late {
 
     /// Returns the time to wait for an answer of a gateway. One that was late is given more than the time-out: otherwise
     /// the requests that wait in it would become more and more.
-    fn patience(&self, timeout: Duration) -> Duration {
+    pub fn patience(&self, timeout: Duration) -> Duration {
         (self.longest * 5 / 4).clamp(timeout, timeout * MOST_PATIENCE)
-    }
-}
-
-impl Master {
-    /// Waits until no late answer of the unit can be mistaken for the answer to this request: until the unit has answered
-    /// 08/00 with a new word, and therefore all requests before it, or until it has been silent. Returns whether the unit
-    /// was silent to 08/00, which may be because it does not have it.
-    pub(super) async fn wait_for_order(&mut self, unit: u8, pdu: &[u8]) -> Result<bool, Lost> {
-        let has_08 = self.late.has_08.get(&unit).copied();
-        if has_08 == Some(false) {
-            self.wait_for_late(QUIET).await.map_err(Lost::Broken)?;
-            self.late.forget(unit);
-            return Ok(false);
-        }
-        let before = self.late.answered;
-        if self.echo.is_none() {
-            self.look_for_echo(unit).await?;
-        }
-        // A response to 08/00 could not be distinguished from an echo. But then the unit has just been silent.
-        let times = match self.echo {
-            None => 0,
-            Some(_) => 1 + self.endpoint().retries,
-        };
-        for n in 1..=times {
-            let [high, low] = self.transaction.to_be_bytes();
-            match self.ask_once(unit, &[8, 0, 0, high, low]).await {
-                Ok(_) | Err(Lost::Absent(_)) => {
-                    self.late.passed(unit);
-                    return Ok(false);
-                }
-                Err(Lost::Silent) => {}
-                Err(lost @ Lost::Broken(_)) => return Err(lost),
-                Err(lost) if n == times => return Err(lost),
-                Err(_) => {}
-            }
-        }
-        if has_08.is_none() && self.late.answered == before {
-            // Nothing was received for at least one time-out.
-            self.late.forget(unit);
-            return Ok(true);
-        }
-        match self.late.can_be_confused(unit, pdu) {
-            true => Err(Lost::Silent),
-            false => Ok(false),
-        }
-    }
-
-    /// Waits for the answers that are late, until nothing was received for this number of time-outs.
-    pub(super) async fn wait_for_late(&mut self, times: u32) -> io::Result<()> {
-        let mut got = Vec::new();
-        let wait = |master: &Self| Instant::now() + times * master.patience();
-        let mut until = wait(self);
-        while self.late.is_expected()
-            && got.len() < MOST
-            && self.read_until(until, &mut got).await? > 0
-        {
-            if self.take_late(&mut got, None) {
-                until = wait(self);
-            }
-        }
-        Ok(())
-    }
-
-    /// Removes late answers from the beginning of the received bytes. `now` is the pending request. Returns whether there
-    /// were any.
-    pub(super) fn take_late(&mut self, got: &mut Vec<u8>, now: Option<(u8, &[u8])>) -> bool {
-        let mut any = false;
-        while let Some((frame, sent)) = self.late.take(self.endpoint().framing, got, now) {
-            self.late.received(sent);
-            self.received(&frame);
-            any = true;
-        }
-        any
-    }
-
-    /// Returns the longest time that a late answer took; zero if no answer was late.
-    pub const fn lateness(&self) -> Duration {
-        self.late.longest()
-    }
-
-    /// Returns the time to wait for an answer.
-    pub(super) fn patience(&self) -> Duration {
-        let timeout = self.endpoint().timeout;
-        match self.endpoint().framing {
-            Framing::Mbap => self.late.patience(timeout),
-            Framing::Rtu | Framing::Ascii => timeout,
-        }
     }
 }
 

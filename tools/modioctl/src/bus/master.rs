@@ -1,25 +1,21 @@
-//! Sends requests to units, one at a time.
+//! Sends requests to units, one at a time, and receives what answers them.
 
 use std::io;
 use std::time::Duration;
 
-use tokio::time::{Instant, sleep, timeout, timeout_at};
+use tokio::time::{Instant, timeout, timeout_at};
 
 use super::adu::{ASCII_MOST, Framing};
+use super::answer::{Lost, MOST, differs, present};
 use super::endpoint::Endpoint;
-use super::gateway::{is_busy, is_from_gateway};
 use super::late::Late;
 use super::stream::Stream;
 use super::{Direction, Waiting};
 use crate::failure::Failure;
-use register_map::state::PRODUCT_CODE;
 
 /// Silence that ends an answer, in addition to the time of some characters. USB adapters deliver bytes in batches,
 /// 16 ms apart and more.
 const BATCH: Duration = Duration::from_millis(60);
-
-/// Number of received bytes after which a line counts as never silent: several of the longest frames.
-pub const MOST: usize = 4 * ASCII_MOST;
 
 /// Number of bytes in front of a request that are discarded at most.
 const STALE: usize = 16 * 1024;
@@ -27,34 +23,8 @@ const STALE: usize = 16 * 1024;
 /// Time limit for the system to take the bytes of a frame, in addition to the time of the frame on the line.
 const SENDING: Duration = Duration::from_secs(2);
 
-/// Pause before a read is repeated because the unit or a gateway is busy.
-const BUSY: Duration = Duration::from_millis(200);
-
-/// Number of times that a read is repeated because the unit or a gateway is busy. It does not depend on `--retries`: that
-/// is for lost requests.
-const BUSY_TIMES: u8 = 2;
-
-/// Reads one register. The response never equals the request, so this shows whether an adapter returns what it sends.
-pub const PROBE: [u8; 5] = {
-    let [high, low] = PRODUCT_CODE.to_be_bytes();
-    [3, high, low, 0, 1]
-};
-
 /// Number of bytes in front of a returned request that are tolerated, as in front of an answer.
 const NOISE: usize = 3;
-
-/// Reason why a request had no answer.
-#[derive(Debug)]
-pub enum Lost {
-    /// Nothing was received.
-    Silent,
-    /// A gateway answered that the unit does not answer it: exception 0A or 0B.
-    Absent(u8),
-    /// These bytes were received, and they are not an answer.
-    Garbled(Vec<u8>),
-    /// The port or the connection is lost.
-    Broken(io::Error),
-}
 
 /// A frame, or bytes that were received instead of one.
 #[derive(Clone, Debug)]
@@ -137,63 +107,6 @@ impl Master {
         self.stream.discard_unsent();
     }
 
-    /// Sends a request to a unit. Repeats it without an answer of the unit as often as the endpoint says, and a read also
-    /// when the unit is busy. Returns the PDU of the response, which may be an exception. The error is that of the last
-    /// attempt, unless an earlier one was garbled.
-    pub async fn ask(&mut self, unit: u8, pdu: &[u8]) -> Result<Vec<u8>, Lost> {
-        if self.echo.is_none() && !differs(pdu) {
-            self.look_for_echo(unit).await?;
-        }
-        let mut was_silent = false;
-        if self.endpoint.framing != Framing::Mbap && self.late.can_be_confused(unit, pdu) {
-            was_silent = self.wait_for_order(unit, pdu).await?;
-        }
-        let result = self.repeat(unit, pdu).await;
-        if was_silent && result.is_ok() {
-            self.late.has_no_08(unit);
-        }
-        result
-    }
-
-    async fn repeat(&mut self, unit: u8, pdu: &[u8]) -> Result<Vec<u8>, Lost> {
-        let mut busy = 0;
-        let mut lost = 0;
-        let mut result = Err(Lost::Silent);
-        loop {
-            let next = self.ask_once(unit, pdu).await;
-            match &next {
-                Ok(answer) if is_busy(pdu, answer) && busy < BUSY_TIMES => {
-                    busy += 1;
-                    sleep(BUSY).await;
-                    continue;
-                }
-                Ok(_) | Err(Lost::Broken(_)) => return next,
-                Err(Lost::Silent | Lost::Absent(_)) if is_garbled(&result) => {}
-                Err(_) => result = next,
-            }
-            if lost == self.endpoint.retries {
-                return result;
-            }
-            lost += 1;
-        }
-    }
-
-    /// Finds out whether the adapter returns what it sends. Without that a response that equals its request proves
-    /// nothing. Silence leaves it open, and the request is sent nevertheless: a unit in listen-only mode obeys without
-    /// an answer.
-    pub(super) async fn look_for_echo(&mut self, unit: u8) -> Result<(), Lost> {
-        let mut result = Ok(());
-        for _ in 0..=self.endpoint.retries {
-            match self.ask_once(unit, &PROBE).await {
-                Err(Lost::Broken(error)) => return Err(Lost::Broken(error)),
-                Err(Lost::Silent) => {}
-                Err(garbled) if self.echo.is_none() => result = Err(garbled),
-                _ => return Ok(()),
-            }
-        }
-        result
-    }
-
     /// Sends a request when the line is free. Returns before the request has been sent completely.
     async fn send(&mut self, unit: u8, pdu: &[u8]) -> io::Result<()> {
         self.settle().await?;
@@ -269,6 +182,33 @@ impl Master {
         }
     }
 
+    /// Removes late answers from the beginning of the received bytes. `now` is the pending request. Returns whether there
+    /// were any.
+    pub(super) fn take_late(&mut self, got: &mut Vec<u8>, now: Option<(u8, &[u8])>) -> bool {
+        let mut any = false;
+        while let Some((frame, sent)) = self.late.take(self.endpoint.framing, got, now) {
+            self.late.received(sent);
+            self.received(&frame);
+            any = true;
+        }
+        any
+    }
+
+    /// Returns the longest time that a late answer took; zero if no answer was late.
+    pub const fn lateness(&self) -> Duration {
+        self.late.longest()
+    }
+
+    /// Returns the time to wait for an answer.
+    pub(super) fn patience(&self) -> Duration {
+        let timeout = self.endpoint.timeout;
+        match self.endpoint.framing {
+            Framing::Mbap => self.late.patience(timeout),
+            Framing::Rtu | Framing::Ascii => timeout,
+        }
+    }
+
+    /// Sends a request once, and waits for its answer.
     pub(super) async fn ask_once(&mut self, unit: u8, pdu: &[u8]) -> Result<Vec<u8>, Lost> {
         self.send(unit, pdu).await.map_err(Lost::Broken)?;
         let sent = self.free;
@@ -382,29 +322,6 @@ impl Master {
             });
         }
     }
-}
-
-const fn is_garbled(result: &Result<Vec<u8>, Lost>) -> bool {
-    matches!(result, Err(Lost::Garbled(_)))
-}
-
-/// Returns the answer of a unit. A gateway answers for a unit that is absent.
-fn present(answer: Vec<u8>) -> Result<Vec<u8>, Lost> {
-    match answer[..] {
-        [0x80..=0xFF, code] if is_from_gateway(code) => Err(Lost::Absent(code)),
-        _ => Ok(answer),
-    }
-}
-
-/// Returns whether every response to this request differs from the request.
-const fn differs(pdu: &[u8]) -> bool {
-    matches!(
-        pdu,
-        [
-            0x01..=0x04 | 0x07 | 0x0B | 0x0C | 0x0F..=0x11 | 0x14 | 0x17 | 0x18,
-            ..
-        ] | [0x2B, 0x0E, ..]
-    )
 }
 
 #[cfg(all(test, unix))]

@@ -13,8 +13,8 @@ use std::time::Duration;
 use tokio::time::{Instant, sleep_until};
 
 use super::adu::{ASCII_MOST, Framing, response_length};
-use super::gateway::is_from_gateway;
-use super::master::{Lost, MOST, Master};
+use super::answer::{Lost, MOST, is_from_gateway};
+use super::master::Master;
 
 /// Report Server ID (V1.1b3, 6.13). Its response differs from the request, so an adapter that returns the request
 /// is not mistaken for a unit.
