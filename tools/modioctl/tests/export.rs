@@ -15,15 +15,9 @@ use modioctl::names::Book;
 use proptest::prelude::*;
 use register_map::Module;
 use register_map::board::{MODIO_02, MODIO_08};
-use serde_json::Value as Json;
+use serde_json::{Value as Json, json};
 
-const FORMATS: [(ExportFormat, &str); 5] = [
-    (Csv, "unit.csv"),
-    (ExportFormat::Json, "unit.json"),
-    (HomeAssistant, "home-assistant.yaml"),
-    (Telegraf, "telegraf.conf"),
-    (NodeRed, "node-red.json"),
-];
+const FORMATS: [ExportFormat; 5] = [Csv, ExportFormat::Json, HomeAssistant, Telegraf, NodeRed];
 
 fn serial() -> Endpoint {
     Endpoint::new(Place::Serial("/dev/ttyUSB0".to_owned()), Framing::Rtu)
@@ -37,10 +31,13 @@ fn modbus_tcp() -> Endpoint {
     Endpoint::new(Place::ModbusTcp("[::1]:502".to_owned()), Framing::Mbap)
 }
 
+/// RANGE and SCALE of an NTC, 4-20 mA, 0-10 V and 4-20 mA in engineering units.
+const READINGS: [(u16, u16); 4] = [(2, 1), (1, 1), (0, 1), (1, 1)];
+
 /// A modio-02 with module 2ai2ao in engineering units: NTC, 4-20 mA, 0-10 V and 4-20 mA.
 fn analog() -> Book {
     let mut readings = vec![(0, 0); 32];
-    readings[0x10..0x14].copy_from_slice(&[(2, 1), (1, 1), (0, 1), (1, 1)]);
+    readings[0x10..0x14].copy_from_slice(&READINGS);
     Book::new(describe(&MODIO_02, "0.1.0", |_| Module::Ai2Ao2), readings)
 }
 
@@ -50,18 +47,18 @@ fn digital() -> Book {
     Book::new(describe(&MODIO_08, "0.1.0", module), vec![(0, 0); 32])
 }
 
-/// A modio-08 with inputs in port 1 and relays in port 2. A link holds the coil of relay 1.
-fn linked() -> Source {
-    let module = |port| match port {
-        1 => Module::Di4,
-        2 => Module::Relay2,
-        _ => Module::None,
-    };
-    let book = Book::new(describe(&MODIO_08, "0.1.0", module), vec![(0, 0); 32]);
-    let held = [("p2.3".to_owned(), vec!["p1.1".to_owned()])];
+/// The first two ports of a modio-08: relays, and an NTC, 4-20 mA, 0-10 V and 4-20 mA. A link holds the coil of relay 1: it
+/// is a sensor that nothing writes.
+fn mixed() -> Source {
+    let module = |port| [Module::Relay2, Module::Ai2Ao2][usize::from(port > 1)];
+    let mut description = describe(&MODIO_08, "0.1.0", module);
+    description.ports.truncate(2);
+    let mut readings = vec![(0, 0); 32];
+    readings[4..8].copy_from_slice(&READINGS);
+    let held = [("p1.3".to_owned(), vec!["p2.1".to_owned()])];
     Source {
         held: held.into(),
-        ..source(1, &book)
+        ..source(1, &Book::new(description, readings))
     }
 }
 
@@ -146,24 +143,112 @@ fn is_stored(text: &str, name: &str) {
 
 #[test]
 fn exports_equal_the_stored_files() {
-    for (format, name) in FORMATS {
-        is_stored(&export(format, &analog(), &serial()).unwrap(), name);
+    let line = Line {
+        name: None,
+        endpoint: &serial(),
+        units: &[mixed()],
+    };
+    let export = |format| text(format, line).unwrap();
+    is_stored(&export(HomeAssistant), "home-assistant.yaml");
+    is_stored(&export(Telegraf), "telegraf.conf");
+    let nodes = list(&parsed(NodeRed, &export(NodeRed)), "");
+    let nodes: Vec<_> = nodes.iter().map(Json::to_string).collect();
+    // A node in each line.
+    is_stored(&format!("[\n{}\n]\n", nodes.join(",\n")), "node-red.json");
+}
+
+#[test]
+fn table_has_a_row_for_each_kind_of_item() {
+    let rows = [
+        (
+            digital(),
+            "p1.1,0,bit,01 02,1,bool,1,0,,read,off | on,digital input,,1",
+        ),
+        (
+            digital(),
+            "p2.1,4,bit,01 02 05 0F,1,bool,1,0,,read write,off | on,digital output,,1",
+        ),
+        (
+            analog(),
+            "p5.1,16,word,03 04,1,int16,0.1,0,°C,read,°C,analog input,,1",
+        ),
+        (
+            analog(),
+            "p5.3,18,word,03 04 06 10,1,uint16,1,0,mV,read write,mV,analog output,,1",
+        ),
+        (
+            analog(),
+            "LORA_CHANNEL,322,word,03 04 06 10,1,uint16,1,410,MHz,read write restart,410 to 441 MHz,Channel of the LoRa module,,1",
+        ),
+        (
+            analog(),
+            "FRAME_GAP,262,word,03 04 06 10,1,uint16,0.1,0,ms,read write restart,\"0.2 to 100.0 ms, or 0\",Silence that ends a frame; 0 = t3.5,,1",
+        ),
+        (
+            analog(),
+            "uptime,520,word,03 04,2,uint32,1,0,s,read,s,Time since the start,,1",
+        ),
+        (
+            analog(),
+            "unique device identity,544,word,03 04,6,bytes,1,0,,read,,96 bits,,1",
+        ),
+        (
+            analog(),
+            "p5.1.pulses,800,word,03 04 10,2,uint32,1,0,,read write,only 0,Rising edges. Write 0 to both registers to clear,,1",
+        ),
+    ];
+    for (book, row) in rows {
+        let text = export_of(Csv, &book);
+        assert!(text.starts_with("name,address,table,function,words,type,scale,offset,unit,access,values,about,line,unit_address\n"));
+        assert!(text.lines().any(|line| line == row), "{row}: {text}");
     }
 }
 
 #[test]
-fn output_that_a_link_holds_is_a_sensor_that_nothing_writes() {
-    for (format, name) in [
-        (HomeAssistant, "linked-home-assistant.yaml"),
-        (Telegraf, "linked-telegraf.conf"),
-        (NodeRed, "linked-node-red.json"),
+fn json_has_the_endpoint_and_every_item() {
+    let book = analog();
+    let mut unit = parsed(ExportFormat::Json, &export_of(ExportFormat::Json, &book));
+    let items = list(&unit, "/items");
+    let names: Vec<_> = book.items().iter().map(|item| &item.name).collect();
+    assert!(texts_of(&items, "name").iter().eq(names));
+    unit.as_object_mut().unwrap().remove("items");
+    assert_eq!(
+        unit,
+        json!({
+            "board": "modio-02",
+            "model": "LLD-ModbusIO-02",
+            "firmware": "0.1.0",
+            "map_version": 2,
+            "source": "this program's register map",
+            "endpoint": {
+                "unit": 1, "port": "/dev/ttyUSB0", "baud": 9600, "format": "8N2", "mode": "rtu",
+            },
+        })
+    );
+    for item in [
+        json!({
+            "name": "p5.1", "address": 16, "table": "word", "words": 1, "unit": "°C",
+            "values": "°C", "about": "analog input",
+            "writable": false, "setting": false, "restart": false,
+        }),
+        json!({
+            "name": "FORMAT", "address": 258, "table": "word", "words": 1, "unit": "",
+            "values": "8N2 | 8E1 | 8O1 | 8N1 | 7E1 | 7O1 | 7N2",
+            "about": "Data, parity and stop bits. 7 bits need MODE 1",
+            "writable": true, "setting": true, "restart": true,
+        }),
+        json!({
+            "name": "p5.1.beta", "address": 368, "table": "word", "words": 1, "unit": "K",
+            "values": "it takes 2000 to 5000 K", "about": "Constant of an NTC",
+            "writable": true, "setting": true, "restart": false,
+        }),
+        json!({
+            "name": "uptime", "address": 520, "table": "word", "words": 2, "unit": "s",
+            "values": "s", "about": "Time since the start",
+            "writable": false, "setting": false, "restart": false,
+        }),
     ] {
-        let line = Line {
-            name: None,
-            endpoint: &serial(),
-            units: &[linked()],
-        };
-        is_stored(&text(format, line).unwrap(), name);
+        assert!(items.contains(&item), "{item}");
     }
 }
 
@@ -296,7 +381,7 @@ fn items_with_the_same_id_are_refused() {
     let twice = status.unwrap().clone();
     registers.push(twice);
     let book = Book::new(description, vec![(0, 0); 32]);
-    for (format, _) in FORMATS {
+    for format in FORMATS {
         let error = export(format, &book, &serial()).unwrap_err();
         assert!(error.contains("modio_02_1_status"), "{error}");
     }
@@ -456,7 +541,7 @@ proptest! {
             let unit = describe(&MODIO_02, "0.1.0", |_| Module::Ai2Ao2);
             Book::new(with_texts(unit, texts), vec![(0, 1); 32])
         };
-        for (format, _) in FORMATS {
+        for format in FORMATS {
             let harmless = export_of(format, &unit(&["x".to_owned()]));
             let text = export_of(format, &unit(&texts));
             prop_assert_eq!(shape(&text, format), shape(&harmless, format));
