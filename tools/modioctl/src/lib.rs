@@ -7,6 +7,7 @@
 
 /// Prints a line on standard error, in place of the macro of the standard library, which panics when standard error is
 /// closed. Nobody reads the line then, and the command goes on.
+#[macro_export]
 macro_rules! eprintln {
     ($($text:tt)*) => {{
         use std::io::Write as _;

@@ -1,13 +1,12 @@
 //! The program.
 
-use std::fmt::Display;
-use std::io::{Write as _, stderr};
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory as _, FromArgMatches as _};
 use modioctl::bus::endpoint::one_line;
 use modioctl::cli::Cli;
+use modioctl::eprintln;
 use modioctl::failure::Failure;
 
 fn main() -> ExitCode {
@@ -21,7 +20,7 @@ fn main() -> ExitCode {
             | ErrorKind::DisplayVersion
             | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => error.exit(),
             _ => {
-                complain(one_line(&error));
+                eprintln!("modioctl: {}", one_line(&error));
                 return ExitCode::from(Failure::usage("").status());
             }
         },
@@ -32,20 +31,15 @@ fn main() -> ExitCode {
     let result = match runtime {
         Ok(runtime) => runtime.block_on(modioctl::run(cli)),
         Err(error) => {
-            complain(format_args!("the system provides no timers: {error}"));
+            eprintln!("modioctl: the system provides no timers: {error}");
             return ExitCode::FAILURE;
         }
     };
     match result {
         Ok(code) => code,
         Err(failure) => {
-            complain(&failure);
+            eprintln!("modioctl: {failure}");
             ExitCode::from(failure.status())
         }
     }
-}
-
-/// Prints an error. The exit status stays the same when standard error is closed.
-fn complain(text: impl Display) {
-    let _ = writeln!(stderr(), "modioctl: {text}");
 }

@@ -60,7 +60,7 @@ const fn group(address: u16) -> &'static str {
 /// Shows identity, state and counters of the unit.
 pub async fn run(device: &mut Device, json: bool) -> Result<(), Failure> {
     let mut identity = match identity(device).await {
-        Err(Unidentified::Lost(lost)) => return Err(device.lost_after(&identify(0), &lost)),
+        Err(Unidentified::Lost(lost)) => return Err(device.lost(Some(&identify(0)), &lost)),
         objects => objects.unwrap_or_default(),
     };
     let book = fetch(device).await?.book;

@@ -35,13 +35,13 @@ pub async fn run(device: &mut Device, options: &Raw) -> Result<(), Failure> {
             output::line(format_args!(
                 "<- {shown}  not an answer to this request{other}"
             ))?;
-            Err(device.lost_after(&pdu, &Lost::Garbled(bytes)))
+            Err(device.lost(Some(&pdu), &Lost::Garbled(bytes)))
         }
         Err(lost) => {
             if let (Lost::Absent(code), [function, ..]) = (&lost, &pdu[..]) {
                 show(&[function | 0x80, *code])?;
             }
-            Err(device.lost_after(&pdu, &lost))
+            Err(device.lost(Some(&pdu), &lost))
         }
     }
 }

@@ -63,12 +63,7 @@ pub async fn run(
 ) -> Result<bool, Failure> {
     let serial = endpoint.place.is_serial();
     let framing = endpoint.framing;
-    if !serial && (options.rates.is_some() || options.formats.is_some()) {
-        return Err(Failure::usage(
-            "--rates and --formats are for a serial port: over TCP the gateway has the line's settings",
-        ));
-    }
-    let lines = lines(&endpoint, options);
+    let lines = lines(&endpoint, options)?;
     if let Some(time) = announcement(&lines, options.units.len()) {
         eprintln!("modioctl: {time}");
     }
@@ -120,17 +115,19 @@ pub async fn run(
         )),
         (true, true) => Err(Failure::NoAnswer(format!(
             "no unit found{}: check power, wiring (A and B swapped?) and rate (`--rates all`); a unit's address is its DIP switch; {DELAYED} {wait}",
-            match scanned.echo {
-                true => ", and the adapter returns what it sends, which is not an answer",
-                false => "",
-            }
+            echo(scanned.echo)
         ))),
     }
 }
 
 /// Returns the lines to try: each rate with each format. RTU needs 8 data bits, so formats with 7 are tried in ASCII
 /// mode.
-pub fn lines(endpoint: &Endpoint, options: &Scan) -> Vec<Endpoint> {
+pub fn lines(endpoint: &Endpoint, options: &Scan) -> Result<Vec<Endpoint>, Failure> {
+    if !endpoint.place.is_serial() && (options.rates.is_some() || options.formats.is_some()) {
+        return Err(Failure::usage(
+            "--rates and --formats are for a serial port: over TCP the gateway has the line's settings",
+        ));
+    }
     let rates = options.rates.clone().unwrap_or(vec![endpoint.baud]);
     let formats = options.formats.clone().unwrap_or(vec![endpoint.format]);
     let line = |baud, format: Format| Endpoint {
@@ -143,7 +140,25 @@ pub fn lines(endpoint: &Endpoint, options: &Scan) -> Vec<Endpoint> {
         ..endpoint.clone()
     };
     let of_rate = |baud| formats.iter().map(move |format| line(baud, *format));
-    rates.into_iter().flat_map(of_rate).collect()
+    Ok(rates.into_iter().flat_map(of_rate).collect())
+}
+
+/// Returns what an adapter does that returns what it sends.
+pub const fn echo(is_there: bool) -> &'static str {
+    match is_there {
+        true => ", and the adapter returns what it sends, which is not an answer",
+        false => "",
+    }
+}
+
+/// Describes rate, format and mode of a line; nothing for one that is not serial.
+pub fn settings(line: &Endpoint) -> String {
+    let Endpoint { baud, format, .. } = line;
+    match (line.place.is_serial(), line.framing) {
+        (false, _) => String::new(),
+        (true, Framing::Ascii) => format!("{baud} {format} ASCII"),
+        (true, _) => format!("{baud} {format}"),
+    }
 }
 
 /// Returns whether every address is asked only once, with the time-out of the line.
@@ -330,7 +345,7 @@ async fn look_at(device: &mut Device) -> Result<Option<Unit>, Failure> {
             texts.join(" ").trim().to_owned()
         }
         Err(Unidentified::Lost(lost @ (Lost::Garbled(_) | Lost::Broken(_)))) => {
-            return Err(device.lost(&lost));
+            return Err(device.lost(None, &lost));
         }
         // Some gateways reject functions that they do not pass, also for an absent unit. Function 03 they pass.
         Err(Unidentified::Exception(_))
@@ -379,14 +394,13 @@ fn print(scanned: &Scanned, serial: bool, json: bool) -> Result<(), Failure> {
         .units
         .iter()
         .map(|unit| {
-            let Endpoint { baud, format, .. } = &unit.line;
-            let line = match (serial, unit.line.framing) {
-                (false, _) => String::new(),
-                (true, Framing::Ascii) => format!("{baud} {format} ASCII"),
-                (true, _) => format!("{baud} {format}"),
-            };
             let (identity, modules) = (unit.identity.clone(), unit.modules.clone());
-            [unit.address.to_string(), line, identity, modules]
+            [
+                unit.address.to_string(),
+                settings(&unit.line),
+                identity,
+                modules,
+            ]
         })
         .collect();
     if !rows.is_empty() {
@@ -427,7 +441,7 @@ mod tests {
             panic!("not a scan");
         };
         let endpoint = cli.endpoint.endpoint(None, None).unwrap();
-        (lines(&endpoint, &options), options.units.len())
+        (lines(&endpoint, &options).unwrap(), options.units.len())
     }
 
     #[test]

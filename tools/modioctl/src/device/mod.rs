@@ -10,10 +10,9 @@ use modbus_line::names;
 
 pub use learn::{fetch, fetch_set, known};
 pub use orders::with_modules;
-use other::shown;
 
 use crate::bus::endpoint::{Endpoint, Place};
-use crate::bus::{Lost, MOST, Master, Observer, adu, is_busy};
+use crate::bus::{Master, Observer, adu, is_busy};
 use crate::failure::Failure;
 
 /// Largest number of registers that one request can read (V1.1b3, 6.3).
@@ -53,7 +52,7 @@ impl Device {
                 [function, code] if function & 0x80 != 0 => Err(self.exception(code, about)),
                 _ => Ok(response),
             },
-            Err(lost) => Err(self.lost_after(pdu, &lost)),
+            Err(lost) => Err(self.lost(Some(pdu), &lost)),
         }
     }
 
@@ -160,34 +159,6 @@ impl Device {
         Failure::Refused(format!(
             "{about}: unit {unit} refuses with exception {code:02X} ({name}): {meaning}"
         ))
-    }
-
-    /// Returns the failure for a request without an answer.
-    pub fn lost(&self, lost: &Lost) -> Failure {
-        let endpoint = self.master.endpoint();
-        let unit = self.unit;
-        let place = place(endpoint);
-        match lost {
-            Lost::Silent if self.master.has_echo() => Failure::NoAnswer(format!(
-                "unit {unit} does not answer at {place}, and the adapter returns what it sends, which is not an answer: check power, wiring (A and B swapped?), address, rate and format; switch the echo of the adapter off if you can"
-            )),
-            Lost::Silent => Failure::NoAnswer(format!(
-                "unit {unit} does not answer at {place}: check power, wiring (A and B swapped?), address, rate and format; `modioctl scan` looks for units"
-            )),
-            Lost::Absent(code) => Failure::NoAnswer(format!(
-                "unit {unit} does not answer the gateway at {place} (exception {code:02X}): check power and wiring of the unit, its address, and rate and format in the gateway"
-            )),
-            Lost::Garbled(bytes) if bytes.len() >= MOST => Failure::Garbled(format!(
-                "the line at {place} is never silent: wrong rate or format, a program that sends all the time, or a line without bias"
-            )),
-            Lost::Garbled(bytes) => Failure::Garbled(format!(
-                "something answers at {place}, but garbled ({}): wrong rate or format, two units with address {unit}, or no termination",
-                shown(endpoint.framing, bytes)
-            )),
-            Lost::Broken(error) => Failure::Port(format!(
-                "{place} is lost ({error}): check that the adapter is plugged in, or that the gateway runs"
-            )),
-        }
     }
 }
 

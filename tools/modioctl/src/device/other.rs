@@ -1,37 +1,56 @@
-//! Words for what was received in place of an answer.
+//! Words for a request without an answer, and for what was received in its place.
 
 use modbus_line::other::{MODBUS_TCP, TELNET};
 
 use super::{Device, place};
 use crate::bus::adu::{self, Framing};
-use crate::bus::{Lost, Place, Waiting, decode};
+use crate::bus::{Lost, MOST, Place, Waiting, decode};
 use crate::failure::Failure;
 
 impl Device {
-    /// Returns the failure for this request without an answer. It is that of [`Self::lost`], if nothing more is known.
-    pub fn lost_after(&self, pdu: &[u8], lost: &Lost) -> Failure {
-        let general = self.lost(lost);
+    /// Returns the failure for a request without an answer. With the request it also names the other kind of TCP, and what
+    /// was received in place of the answer.
+    pub fn lost(&self, request: Option<&[u8]>, lost: &Lost) -> Failure {
         let endpoint = self.master.endpoint();
-        let other_kind = match &endpoint.place {
-            Place::Serial(_) => String::new(),
-            Place::Tcp(address) => format!("; if it speaks Modbus TCP, use --modbus-tcp {address}"),
-            Place::ModbusTcp(address) => {
+        let unit = self.unit;
+        let place = place(endpoint);
+        let other_kind = match (&endpoint.place, request) {
+            (Place::Serial(_), _) | (_, None) => String::new(),
+            (Place::Tcp(address), _) => {
+                format!("; if it speaks Modbus TCP, use --modbus-tcp {address}")
+            }
+            (Place::ModbusTcp(address), _) => {
                 format!("; if it passes on raw frames, use --tcp {address}")
             }
         };
         match lost {
-            Lost::Silent if !self.master.has_echo() => {
-                Failure::NoAnswer(format!("{general}{other_kind}"))
+            Lost::Silent if self.master.has_echo() => Failure::NoAnswer(format!(
+                "unit {unit} does not answer at {place}, and the adapter returns what it sends, which is not an answer: check power, wiring (A and B swapped?), address, rate and format; switch the echo of the adapter off if you can"
+            )),
+            Lost::Silent => Failure::NoAnswer(format!(
+                "unit {unit} does not answer at {place}: check power, wiring (A and B swapped?), address, rate and format; `modioctl scan` looks for units{other_kind}"
+            )),
+            Lost::Absent(code) => Failure::NoAnswer(format!(
+                "unit {unit} does not answer the gateway at {place} (exception {code:02X}): check power and wiring of the unit, its address, and rate and format in the gateway"
+            )),
+            Lost::Garbled(bytes) => {
+                let shown = shown(endpoint.framing, bytes);
+                let other = request.and_then(|pdu| self.other(pdu, bytes));
+                Failure::Garbled(match other {
+                    Some(other) => format!(
+                        "something answers at {place}, but not this request ({shown}): {other}"
+                    ),
+                    None if bytes.len() >= MOST => format!(
+                        "the line at {place} is never silent: wrong rate or format, a program that sends all the time, or a line without bias"
+                    ),
+                    None => format!(
+                        "something answers at {place}, but garbled ({shown}): wrong rate or format, two units with address {unit}, or no termination"
+                    ),
+                })
             }
-            Lost::Broken(_) => Failure::Port(format!("{general}{other_kind}")),
-            Lost::Garbled(bytes) => self.other(pdu, bytes).map_or(general, |other| {
-                Failure::Garbled(format!(
-                    "something answers at {}, but not this request ({}): {other}",
-                    place(endpoint),
-                    shown(endpoint.framing, bytes)
-                ))
-            }),
-            _ => general,
+            Lost::Broken(error) => Failure::Port(format!(
+                "{place} is lost ({error}): check that the adapter is plugged in, or that the gateway runs{other_kind}"
+            )),
         }
     }
 
@@ -50,7 +69,7 @@ impl Device {
 }
 
 /// Returns the first bytes of an answer, and how many there are.
-pub fn shown(framing: Framing, bytes: &[u8]) -> String {
+fn shown(framing: Framing, bytes: &[u8]) -> String {
     let first = bytes.get(..bytes.len().min(12)).unwrap_or_default();
     let more = if first.len() < bytes.len() {
         " ..."

@@ -110,7 +110,7 @@ fn lost(device: &Device, lost: &Lost) -> Failure {
         Lost::Garbled(_) => Failure::Garbled(format!(
             "units answer at {place}, but garbled: two units with one address, no termination, or units of several makers"
         )),
-        broken @ Lost::Broken(_) => device.lost(broken),
+        broken @ Lost::Broken(_) => device.lost(None, broken),
     }
 }
 

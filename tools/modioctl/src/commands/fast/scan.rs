@@ -9,7 +9,7 @@ use super::hex;
 use crate::bus::adu::Framing;
 use crate::bus::{Endpoint, Lost, Master, Observer, check_line, decode, shared};
 use crate::cli;
-use crate::commands::scan::lines;
+use crate::commands::scan::{echo, lines, settings};
 use crate::device::place;
 use crate::failure::Failure;
 use crate::output;
@@ -45,17 +45,10 @@ pub async fn run(
 ) -> Result<bool, Failure> {
     check_line(&endpoint)?;
     let serial = endpoint.place.is_serial();
-    if !serial && (options.rates.is_some() || options.formats.is_some()) {
-        return Err(Failure::usage(
-            "--rates and --formats are for a serial port: over TCP the gateway has the line's settings",
-        ));
-    }
     // Formats with 7 data bits are for ASCII.
     let is_rtu = |line: &Endpoint| line.framing == Framing::Rtu;
-    let lines: Vec<_> = lines(&endpoint, options)
-        .into_iter()
-        .filter(is_rtu)
-        .collect();
+    let lines = lines(&endpoint, options)?.into_iter().filter(is_rtu);
+    let lines = lines.collect();
     let mut scanned = Scanned::default();
     let result = tokio::select! {
         // Ctrl-C is handled before the scan begins.
@@ -75,10 +68,7 @@ pub async fn run(
         )),
         (true, true) => Err(Failure::NoAnswer(format!(
             "no unit with Fast Modbus (function 70) found{}: check power, wiring (A and B swapped?) and rate (`--rates all`); `modioctl scan` without --fast also finds units that do not have it",
-            match scanned.echo {
-                true => ", and the adapter returns what it sends, which is not an answer",
-                false => "",
-            }
+            echo(scanned.echo)
         ))),
     }
 }
@@ -206,12 +196,10 @@ fn print(scanned: &Scanned, serial: bool, json: bool) -> Result<(), Failure> {
         );
     }
     let row = |unit: &Unit| {
-        let line = format!("{} {}", unit.line.baud, unit.line.format);
-        let line = if serial { line } else { String::new() };
         let (identity, note) = (unit.identity.clone(), unit.note.to_owned());
         [
             unit.address.to_string(),
-            line,
+            settings(&unit.line),
             hex(unit.serial),
             identity,
             note,

@@ -136,7 +136,7 @@ impl Drive<'_> {
     }
 
     fn broken(&self, error: std::io::Error) -> Failure {
-        self.device.lost(&Lost::Broken(error))
+        self.device.lost(None, &Lost::Broken(error))
     }
 
     async fn ask(
@@ -157,7 +157,7 @@ impl Drive<'_> {
         match answer {
             Ok(answer) => Ok(Some(answer)),
             Err(Lost::Silent | Lost::Absent(_) | Lost::Garbled(_)) => Ok(None),
-            Err(lost @ Lost::Broken(_)) => Err(self.device.lost(&lost)),
+            Err(lost @ Lost::Broken(_)) => Err(self.device.lost(None, &lost)),
         }
     }
 
