@@ -129,8 +129,11 @@ impl Modio {
             let code = self.saved.get(&at::module_of(port)).copied();
             *module = code.and_then(Module::from_code).unwrap_or(Module::None);
         }
+        let [version, patch] = [state::FIRMWARE_VERSION, state::FIRMWARE_PATCH]
+            .map(|address| self.register(address, &[0; 9]));
+        let version = format!("{}.{}.{patch}", version >> 8, version & 0xFF);
         let modules = self.modules;
-        let description = describe(self.board, "0.1.0", |port| modules[usize::from(port) - 1]);
+        let description = describe(self.board, &version, |port| modules[usize::from(port) - 1]);
         self.describe(&description);
         self.set_outputs(at::START, at::AS_IT_WAS);
     }

@@ -13,7 +13,7 @@ use register_map::state::UPDATE;
 
 use crate::gateway::Gateway;
 use crate::program::{At, has};
-use crate::served::{modio_02, response, serve_requests, server};
+use crate::served::{Answers, Modio, other, serve_requests};
 
 const MS: Duration = Duration::from_millis(1);
 
@@ -22,15 +22,15 @@ fn units(addresses: &'static [u8]) -> SocketAddr {
     let mut server = modio();
     serve_requests(move |unit, pdu| {
         Some(match addresses.contains(&unit) {
-            true => response(&mut server, unit, pdu),
+            true => server.response(unit, pdu),
             false => Vec::new(),
         })
     })
 }
 
 /// Returns a modio-02 with a loader.
-fn modio() -> Server {
-    server(modio_02(Module::Di4).into_iter().chain([(UPDATE, 1)]))
+fn modio() -> Modio {
+    Modio::modio_02(Module::Di4).with([(UPDATE, 1)])
 }
 
 #[test]
@@ -41,7 +41,7 @@ fn exceptions_0a_and_0b_are_asked_again_on_every_line() {
         let line = serve_requests(move |unit, pdu| {
             requests += 1;
             Some(match requests % 3 {
-                0 => response(&mut server, unit, pdu),
+                0 => server.response(unit, pdu),
                 _ => Framing::Rtu.frame(0, unit, &[pdu[0] | 0x80, code]),
             })
         });
@@ -63,11 +63,7 @@ fn a_unit_that_no_try_finds_behind_a_gateway_is_status_3() {
         *count.lock().unwrap() += 1;
         Some(Vec::new())
     });
-    let wait = 30 * MS;
-    let gateway = Gateway {
-        wait,
-        ..Gateway::default()
-    };
+    let gateway = Gateway::waiting(30 * MS);
     let text = At::modbus_tcp(gateway.before(line)).run("read 0").failed(3);
     has(
         &text,
@@ -106,7 +102,7 @@ fn busy_is_asked_again_without_retries() {
         is_busy = !is_busy;
         Some(match is_busy {
             true => Framing::Rtu.frame(0, unit, &[pdu[0] | 0x80, 6]),
-            false => response(&mut server, unit, pdu),
+            false => server.response(unit, pdu),
         })
     });
     let text = At::tcp(line).run("--retries 0 read p5.1").fine();
@@ -117,11 +113,7 @@ fn busy_is_asked_again_without_retries() {
 #[test]
 fn a_scan_waits_for_the_late_answers_of_a_gateway() {
     for healthy in [&[2, 5, 6][..], &[]] {
-        let wait = 200 * MS;
-        let gateway = Gateway {
-            wait,
-            ..Gateway::default()
-        };
+        let gateway = Gateway::waiting(200 * MS);
         let at = At::modbus_tcp(gateway.before(units(healthy)));
         let ran = at.run("--timeout 100ms scan --units 1-6");
         let found = ran.out.lines().map(|line| line[..1].parse().unwrap());
@@ -140,15 +132,11 @@ fn a_scan_over_modbus_tcp_asks_again_and_counts_the_silent_addresses() {
         asked[usize::from(unit)] += 1;
         Some(match (unit, asked[usize::from(unit)]) {
             (5, 1) => Framing::Rtu.frame(0, unit, &[pdu[0] | 0x80, 0x0B]),
-            (2 | 5, _) => response(&mut server, unit, pdu),
+            (2 | 5, _) => server.response(unit, pdu),
             _ => Vec::new(),
         })
     });
-    let wait = 200 * MS;
-    let gateway = Gateway {
-        wait,
-        ..Gateway::default()
-    };
+    let gateway = Gateway::waiting(200 * MS);
     let ran = At::modbus_tcp(gateway.before(line)).run("scan --units 1-6");
     has(&ran.err, &["silent addresses: 4; ", "in the gateway"]);
     let text = ran.fine();
@@ -163,16 +151,12 @@ fn an_address_that_is_busy_and_then_silent_is_named_by_a_scan() {
     let line = serve_requests(move |unit, pdu| {
         asked += i32::from(unit == 2);
         Some(match unit {
-            1 => response(&mut server, unit, pdu),
+            1 => server.response(unit, pdu),
             2 if asked == 1 => Framing::Rtu.frame(0, unit, &[pdu[0] | 0x80, 6]),
             _ => Vec::new(),
         })
     });
-    let wait = 200 * MS;
-    let gateway = Gateway {
-        wait,
-        ..Gateway::default()
-    };
+    let gateway = Gateway::waiting(200 * MS);
     let ran = At::modbus_tcp(gateway.before(line)).run("scan --units 1-3");
     has(&ran.failed(1), &["had no time for addresses 2:"]);
 }
@@ -197,7 +181,7 @@ fn a_gateway_with_rtu_frames_that_passes_only_standard_functions_creates_no_unit
     let mut server = modio();
     let line = serve_requests(move |unit, pdu| {
         Some(match (unit, pdu[0]) {
-            (3, 1..=7) => response(&mut server, unit, pdu),
+            (3, 1..=7) => server.response(unit, pdu),
             (_, 1..=7) => Framing::Rtu.frame(0, unit, &[pdu[0] | 0x80, 0x0B]),
             _ => Framing::Rtu.frame(0, unit, &[pdu[0] | 0x80, 1]),
         })
@@ -299,7 +283,7 @@ impl Echo {
             (Self::Lost, 8) if server.device.words[0x3F] % 2 == 1 => Vec::new(),
             (Self::Silence, 8) => Vec::new(),
             (Self::Exception, 8) => Framing::Rtu.frame(0, unit, &[0x88, 1]),
-            _ => response(server, unit, pdu),
+            _ => server.response(unit, pdu),
         }
     }
 }
@@ -319,7 +303,10 @@ fn a_late_answer_is_never_mistaken_for_the_answer_to_another_request() {
 }
 
 fn read_late_in_turn(framing: Framing, echo: Echo, retries: u8) {
-    let mut server = server((0..0x30).map(|n| (n, n)));
+    let mut server = other();
+    for (word, n) in server.device.words.iter_mut().zip(0..0x30) {
+        *word = n;
+    }
     let mut random = fastrand::Rng::with_seed(1);
     let line = serve_requests(move |unit, pdu| {
         // Often twice in succession.
@@ -341,7 +328,7 @@ fn damaging(
 ) -> (At, Arc<Mutex<usize>>) {
     let count = Arc::new(Mutex::new(0));
     let requests = Arc::clone(&count);
-    let mut server = server([]);
+    let mut server = other();
     let mut damage = false;
     let line = serve_requests(move |unit, pdu| {
         *requests.lock().unwrap() += usize::from(pdu[0] == 8);

@@ -7,14 +7,14 @@ use portable_pty::{CommandBuilder, PtySize, native_pty_system};
 use register_map::Module;
 
 use crate::program::At;
-use crate::served::{modio_02, response, serve_requests, server};
+use crate::served::{Answers, Modio, serve_requests};
 
 /// Serves a modio-02 with digital inputs at address 1.
 fn unit() -> SocketAddr {
-    let mut server = server(modio_02(Module::Di4));
+    let mut server = Modio::modio_02(Module::Di4);
     serve_requests(move |unit, pdu| {
         Some(match unit {
-            1 => response(&mut server, unit, pdu),
+            1 => server.response(unit, pdu),
             _ => Vec::new(),
         })
     })

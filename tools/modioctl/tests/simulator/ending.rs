@@ -2,11 +2,11 @@
 
 use register_map::Module;
 use register_map::codes::Command;
-use register_map::configuration::{BAUD, COMMAND, LORA_ADDRESS, MODULE};
+use register_map::configuration::{COMMAND, LORA_ADDRESS, MODULE};
 use register_map::state::{STATUS, status};
 
 use crate::program::{At, Ran, has};
-use crate::served::{modio_02, response, serve_requests, server};
+use crate::served::{Answers, Modio, serve_requests, serve_unit};
 
 /// Exception of a unit that allows no value.
 const REFUSES: Option<u8> = Some(3);
@@ -18,9 +18,7 @@ fn run(words: &str, request: &[u8], exception: Option<u8>) -> Ran {
     let file = folder.path().join("unit.toml");
     let settings = "COMM_TIMEOUT = 2.5\nCOMM_SOURCE = 1\nLORA_ADDRESS = 7\n";
     std::fs::write(&file, settings).unwrap();
-    // With the factory's rate a reset does not change the line.
-    let registers = modio_02(Module::Do4).into_iter();
-    let mut server = server(registers.chain([(BAUD, 96)]));
+    let mut server = Modio::modio_02(Module::Do4);
     let request = request.to_vec();
     let mut is_gone = false;
     let unit = serve_requests(move |unit, pdu| {
@@ -31,7 +29,7 @@ fn run(words: &str, request: &[u8], exception: Option<u8>) -> Ran {
             Some(code) if is_it => {
                 modioctl::bus::adu::Framing::Rtu.frame(0, unit, &[pdu[0] | 0x80, code])
             }
-            _ => response(&mut server, unit, pdu),
+            _ => server.response(unit, pdu),
         })
     });
     let words = words.replace("FILE", file.to_str().unwrap());
@@ -161,10 +159,8 @@ fn a_unit_that_refuses_one_of_several_requests_has_not_carried_it_out() {
 
 #[test]
 fn a_save_that_the_unit_puts_off_may_still_be_made() {
-    let registers = modio_02(Module::Do4).into_iter();
-    let mut server = server(registers.chain([(STATUS, status::UNSAVED)]));
-    let unit = serve_requests(move |unit, pdu| Some(response(&mut server, unit, pdu)));
-    let text = At::tcp(unit).run("config save").failed(1);
+    let unit = Modio::modio_02(Module::Do4).with([(STATUS, status::UNSAVED)]);
+    let text = At::tcp(serve_unit(unit)).run("config save").failed(1);
     has(
         &text,
         &["the settings are not saved", "; the settings may be saved"],

@@ -83,27 +83,6 @@ fn wrong_names_and_values_are_status_2_and_nothing_is_written() {
     assert_eq!(at.run("read p5.1").fine(), "p5.1  off\n");
 }
 
-#[test]
-#[ignore = "needs the simulator: cargo xtask test"]
-fn silence_is_status_3() {
-    let unit = Unit::with(1, &["--module", "4di"]);
-    let at = At::tcp(unit.tcp);
-    let text = at.run("--unit 2 --timeout 100ms info").failed(3);
-    assert!(text.contains("unit 2 does not answer"), "{text}");
-    let text = at.run("--unit 2 scan --units 2-9").failed(3);
-    assert!(text.contains("no unit found"), "{text}");
-}
-
-#[test]
-#[ignore = "needs the simulator: cargo xtask test"]
-fn a_wrong_rate_is_status_3_or_4() {
-    // The unit runs at 9600 bit/s, the line at 4800. The unit does not recognise the request, or the reply is garbled.
-    let unit = Unit::with(1, &["--module", "4di", "--line", "4800,8N2"]);
-    let at = At::port(unit.pty.display());
-    let ran = at.run("--timeout 300ms info");
-    assert!(ran.status == 4 || ran.status == 3, "{ran:?}");
-}
-
 /// Two units with address 1: their answers collide on the line, where a 0 overrides a 1.
 fn two_units_with_one_address() -> SocketAddr {
     serve_requests(|unit, pdu| {

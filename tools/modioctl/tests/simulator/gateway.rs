@@ -39,6 +39,14 @@ pub fn before(line: SocketAddr) -> SocketAddr {
 }
 
 impl Gateway {
+    /// A usual gateway that waits this time for a unit.
+    pub fn waiting(wait: Duration) -> Self {
+        Self {
+            wait,
+            ..Self::default()
+        }
+    }
+
     /// Starts the gateway to the line at `line` and returns the gateway's address.
     pub fn before(self, line: SocketAddr) -> SocketAddr {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();

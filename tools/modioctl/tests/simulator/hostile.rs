@@ -10,7 +10,7 @@ use modbus_reference::{Device, Server};
 use modioctl::bus::adu::Framing;
 
 use crate::program::At;
-use crate::served::{response, serve, serve_requests};
+use crate::served::{Answers, serve, serve_requests};
 
 /// Commands with requests whose responses equal the request.
 const COMMANDS: [&str; 10] = [
@@ -40,7 +40,7 @@ fn echo(delay: Option<Duration>) -> SocketAddr {
                 continue;
             };
             thread::sleep(delay);
-            let _ = master.write_all(&response(&mut server, 1, &pdu));
+            let _ = master.write_all(&server.response(1, &pdu));
         }
     })
 }

@@ -4,23 +4,22 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
-use modbus_reference::Server;
 use register_map::Module;
 use register_map::configuration::{COMM_TIMEOUT, LORA_ADDRESS, MODULE};
 
 use crate::program::At;
-use crate::served::{modio_02, response, serve_requests, server};
+use crate::served::{Answers, Modio, serve_requests};
 use crate::terminal::Terminal;
 
-type Shared = Arc<Mutex<Server>>;
+type Shared = Arc<Mutex<Modio>>;
 
 /// Returns a modio-02 with a 4do. It does not answer a write to `silent_at`.
 fn unit(silent_at: u16) -> (SocketAddr, Shared) {
-    let server = Arc::new(Mutex::new(server(modio_02(Module::Do4))));
+    let server = Arc::new(Mutex::new(Modio::modio_02(Module::Do4)));
     let served = Arc::clone(&server);
     let address = serve_requests(move |unit, pdu| {
         let silent = pdu[0] == 6 && pdu[1..3] == silent_at.to_be_bytes();
-        let answer = || response(&mut served.lock().unwrap(), unit, pdu);
+        let answer = || served.lock().unwrap().response(unit, pdu);
         Some(if silent { Vec::new() } else { answer() })
     });
     (address, server)
@@ -34,7 +33,7 @@ fn file(text: &str) -> (tempfile::TempDir, PathBuf) {
 }
 
 fn word(unit: &Shared, address: u16) -> u16 {
-    unit.lock().unwrap().device.words[usize::from(address)]
+    unit.lock().unwrap().modio.edited[&address]
 }
 
 #[test]

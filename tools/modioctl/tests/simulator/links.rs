@@ -2,18 +2,14 @@
 
 use register_map::Module;
 use register_map::board::MODIO_08;
-use register_map::links::{LINKS, NO_SOURCE, WORDS};
 
 use crate::program::{At, has};
-use crate::served::{modio, modio_02, response, serve_requests, server};
+use crate::served::{Answers, Modio, other, serve_requests, serve_unit};
 use crate::unit::Unit;
 
 #[test]
 fn unit_without_links_is_reported() {
-    let mut unit = server(modio_02(Module::Do4));
-    let at = At::tcp(serve_requests(move |address, pdu| {
-        Some(response(&mut unit, address, pdu))
-    }));
+    let at = At::tcp(serve_unit(Modio::modio_02(Module::Do4)));
     for words in ["links", "link p5.1 toggles p5.2", "link none p5.1"] {
         has(&at.run(words).failed(2), &["the unit has no links"]);
     }
@@ -22,16 +18,12 @@ fn unit_without_links_is_reported() {
 /// A modio-08 with 0-10 V inputs in raw codes in port 1, and outputs in port 2.
 #[test]
 fn settings_that_make_a_link_surprising_are_warned_of_by_each_command() {
-    let modio = modio(&MODIO_08, |port| match port {
+    let unit = Modio::of(&MODIO_08, |port| match port {
         1 => Module::Ai4,
         2 => Module::Do4,
         _ => Module::None,
     });
-    let none = (LINKS..).step_by(WORDS.into()).take(64);
-    let mut unit = server(none.map(|link| (link, NO_SOURCE)).chain(modio));
-    let at = At::tcp(serve_requests(move |address, pdu| {
-        Some(response(&mut unit, address, pdu))
-    }));
+    let at = At::tcp(serve_unit(unit));
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("unit.toml");
     std::fs::write(&file, "p2.1.link1 = \"p1.1, 257, 900, 800\"\n").unwrap();
@@ -56,22 +48,19 @@ fn settings_that_make_a_link_surprising_are_warned_of_by_each_command() {
 /// Register 0x0104 is COMM_TIMEOUT of a modio.
 #[test]
 fn write_that_succeeded_does_not_fail_because_of_a_warning() {
-    let mut other = server([]);
-    let at = At::tcp(serve_requests(move |address, pdu| {
-        Some(response(&mut other, address, pdu))
-    }));
+    let at = At::tcp(serve_unit(other()));
     let ran = at.run("write 0x0104=5");
     assert_eq!(ran.err, "");
     ran.fine();
     // A unit that is switched off after the write.
-    let mut unit = server(modio_02(Module::Do4));
+    let mut unit = Modio::modio_02(Module::Do4);
     let mut is_off = false;
     let at = At::tcp(serve_requests(move |address, pdu| {
         if is_off {
             return Some(Vec::new());
         }
         is_off = pdu[..3] == [6, 0x01, 0x04];
-        Some(response(&mut unit, address, pdu))
+        Some(unit.response(address, pdu))
     }));
     at.run("--timeout 100ms --retries 0 write COMM_TIMEOUT=5")
         .fine();

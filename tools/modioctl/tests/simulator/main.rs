@@ -23,7 +23,6 @@ mod ordinary;
 mod program;
 mod restart;
 mod scanning;
-mod screen;
 mod served;
 mod strange;
 mod terminal;

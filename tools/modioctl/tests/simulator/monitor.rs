@@ -3,19 +3,19 @@
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
-use modbus_reference::Server;
 use modioctl::bus::adu::Framing;
 use register_map::Module;
-use register_map::state::{PRODUCT_CODE, UPTIME_MS};
+use register_map::state::PRODUCT_CODE;
 
-use crate::served::{modio_02, response, serve_requests, server};
+use crate::served::{Answers, Modio, serve_requests};
 use crate::terminal::{Terminal, wait};
 
 /// A unit that is served over TCP with RTU frames.
 struct Unit {
     address: SocketAddr,
-    server: Arc<Mutex<Server>>,
+    modio: Arc<Mutex<Modio>>,
     faults: Arc<Faults>,
 }
 
@@ -32,9 +32,9 @@ struct Faults {
 impl Unit {
     /// Starts a modio-02 with a 4do.
     fn serve() -> Self {
-        let server = Arc::new(Mutex::new(server(modio_02(Module::Do4))));
+        let modio = Arc::new(Mutex::new(Modio::modio_02(Module::Do4)));
         let faults = Arc::<Faults>::default();
-        let (served, of_served) = (Arc::clone(&server), Arc::clone(&faults));
+        let (served, of_served) = (Arc::clone(&modio), Arc::clone(&faults));
         let address = serve_requests(move |unit, pdu| {
             let is = |fault: &AtomicBool| fault.load(Ordering::SeqCst);
             if is(&of_served.hangs_up) {
@@ -44,24 +44,17 @@ impl Unit {
             if is(&of_served.silent) || ignores {
                 return Some(Vec::new());
             }
-            Some(response(&mut served.lock().unwrap(), unit, pdu))
+            Some(served.lock().unwrap().response(unit, pdu))
         });
         Self {
             address,
-            server,
+            modio,
             faults,
         }
     }
 
     fn bit(&self, address: usize) -> bool {
-        self.server.lock().unwrap().device.bits[address]
-    }
-
-    fn set_words(&self, words: &[(u16, u16)]) {
-        let device = &mut self.server.lock().unwrap().device;
-        for (address, word) in words {
-            device.words[usize::from(*address)] = *word;
-        }
+        self.modio.lock().unwrap().modio.bits[address]
     }
 }
 
@@ -102,7 +95,9 @@ fn output_is_switched_by_key_and_by_click_and_a_silent_unit_is_shown() {
     assert!(unit.bit(0x12));
 
     // The unit returns with another module.
-    unit.set_words(&modio_02(Module::Di4));
+    let mut other = Modio::modio_02(Module::Di4);
+    other.modio.bits[0x12] = true;
+    *unit.modio.lock().unwrap() = other;
     unit.faults.silent.store(false, Ordering::SeqCst);
     terminal.wait_for("● answers");
     terminal.wait_for("p5.3 digital input         ■ on  good");
@@ -147,16 +142,16 @@ fn lost_connection_is_opened_again() {
 
 #[test]
 fn edges_of_the_selected_input_are_read() {
-    let mut server = server(modio_02(Module::Di4));
-    server.device.words[usize::from(UPTIME_MS) + 1] = 5000;
-    let address = serve_requests(move |unit, pdu| {
+    let mut unit = Modio::modio_02(Module::Di4);
+    unit.modio.now = Duration::from_secs(5);
+    let address = serve_requests(move |address, pdu| {
         // The newest 20 edges: the last one is p5.1 on, 2 s before the uptime.
         const LOG: &[u8] = &[0x14, 7, 6, 0, 3, 0, 133, 0, 60];
         const EDGE: [u8; 6] = [0x01, 0x10, 0, 0, 0x0B, 0xB8];
         let edges = [&[0x14, 122, 121, 6][..], &[0; 114], &EDGE].concat();
         Some(match pdu {
-            LOG => Framing::Rtu.frame(0, unit, &edges),
-            _ => response(&mut server, unit, pdu),
+            LOG => Framing::Rtu.frame(0, address, &edges),
+            _ => unit.response(address, pdu),
         })
     });
     let mut terminal = Terminal::run(&["--tcp", &address.to_string(), "monitor"]);
@@ -185,7 +180,8 @@ fn ctrl_c_restores_the_terminal_with_status_0() {
 #[test]
 fn unit_that_is_not_a_modio_ends_with_status_1() {
     let unit = Unit::serve();
-    unit.set_words(&[(PRODUCT_CODE, 0)]);
+    let product = (PRODUCT_CODE, 0);
+    unit.modio.lock().unwrap().modio.fixed.extend([product]);
     let mut terminal = Terminal::run(&["--tcp", &unit.address.to_string(), "monitor"]);
     assert_eq!(terminal.wait_for_end().exit_code(), 1);
     terminal.wait_for("not a modio");

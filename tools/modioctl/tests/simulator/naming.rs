@@ -8,7 +8,7 @@ use portable_pty::{PtySize, native_pty_system};
 use register_map::Module;
 
 use crate::program::At;
-use crate::served::{modio_02, response, server};
+use crate::served::{Answers, Modio};
 
 #[test]
 fn export_with_a_port_whose_number_can_change_is_warned_of() {
@@ -16,11 +16,11 @@ fn export_with_a_port_whose_number_can_change_is_warned_of() {
     let mut requests = pty.master.try_clone_reader().unwrap();
     let mut responses = pty.master.take_writer().unwrap();
     std::thread::spawn(move || {
-        let mut server = server(modio_02(Module::Di4));
+        let mut server = Modio::modio_02(Module::Di4);
         let mut bytes = [0; 256];
         while let Ok(count @ 1..) = requests.read(&mut bytes) {
             if let Some((unit, pdu)) = Framing::Rtu.open(&bytes[..count]) {
-                let _ = responses.write_all(&response(&mut server, unit, &pdu));
+                let _ = responses.write_all(&server.response(unit, &pdu));
             }
         }
     });

@@ -2,19 +2,24 @@
 
 use std::net::SocketAddr;
 
-use modio_description::{Description, Register, Scope, Unit, Value, Values, checksum, describe};
+use modio_description::{Description, Register, Scope, Unit, Value, Values, describe};
 use register_map::Module;
 use register_map::board::MODIO_02;
+use register_map::points::first;
+use register_map::state::{BOARD, FIRMWARE_PATCH, FIRMWARE_VERSION, UNIQUE_ID};
 
 use crate::program::{At, Ran, has};
-use crate::served::{response, serve_requests, server};
+use crate::served::{Answers, Modio, serve_requests};
+
+/// A register that only this unit has.
+const PRESSURE_LIMIT: u16 = 0x0500;
 
 /// Returns the description: that of a modio-02 with new parts.
 fn description() -> Description {
     let mut description = describe(&MODIO_02, "9.9.9", |_| Module::Ai4);
     description.board = "modio-99".to_owned();
     description.registers.push(Register {
-        address: 0x0500,
+        address: PRESSURE_LIMIT,
         count: 1,
         name: "PRESSURE_LIMIT".to_owned(),
         scope: Scope::Unit,
@@ -36,25 +41,20 @@ fn description() -> Description {
 /// Serves the registers of a unit with this description, its file and this identity, at every address but
 /// [`MISSING`].
 fn unit(description: &Description, identity: u16) -> SocketAddr {
-    let mut server = server([
-        (0x0200, 0x2383),
-        (0x0201, 0x5860),
-        (0x0202, 0x0909),
-        (0x0203, 9),
-        (0x0204, 1),
-        (0x0205, 99),
-        (0x020F, checksum(&description.encode())),
-        (0x0500, 1234),
-        (0x0010, 7),
-    ]);
-    server.device.words[0x0220..0x0226].fill(identity);
-    let file = description.file();
-    let words = file.as_chunks().0.iter().copied();
-    server.device.files = vec![words.map(u16::from_be_bytes).collect()];
+    let identity = (UNIQUE_ID..UNIQUE_ID + 6).map(|register| (register, identity));
+    let registers = [
+        (FIRMWARE_VERSION, 0x0909),
+        (FIRMWARE_PATCH, 9),
+        (BOARD, 99),
+        (PRESSURE_LIMIT, 1234),
+    ];
+    let mut modio = Modio::modio_02(Module::Ai4).with(registers.into_iter().chain(identity));
+    modio.modio.describe(description);
+    modio.modio.words[usize::from(first(5))] = 7;
     serve_requests(move |unit, pdu| {
         Some(match unit {
             MISSING => Vec::new(),
-            unit => response(&mut server, unit, pdu),
+            unit => modio.response(unit, pdu),
         })
     })
 }

@@ -11,7 +11,7 @@ use modbus_reference::{Device, Server, framed};
 use modioctl::bus::adu::{Framing, request_length};
 
 use crate::program::{At, has};
-use crate::served::{response, serve_requests};
+use crate::served::{Answers, serve_requests};
 use crate::unit::Unit;
 
 /// The shortest time-out with which a master finds every unit when it waits for each in turn: V1.02, 2.4.1, gives
@@ -30,7 +30,7 @@ fn bus(addresses: BTreeSet<u8>, delay: Duration) -> (SocketAddr, Receiver<(u8, I
             return Some(Vec::new());
         }
         thread::sleep(delay);
-        Some(response(&mut server, unit, pdu))
+        Some(server.response(unit, pdu))
     });
     (address, requests)
 }
@@ -128,7 +128,7 @@ fn delayed(addresses: &[u8]) -> (SocketAddr, Receiver<u8>) {
                         rest = after;
                         let (unit, pdu) = Framing::Rtu.open(request).unwrap();
                         let _ = tell.send(unit);
-                        let frame = response(&mut server, unit, &pdu);
+                        let frame = server.response(unit, &pdu);
                         answer = addresses.contains(&unit).then_some(frame);
                     }
                 }
@@ -225,7 +225,7 @@ fn a_scan_whose_line_is_lost_prints_what_it_found_and_what_it_did_not_do() {
             if unit == fails_at && (unit == 5 || again) {
                 return None;
             }
-            let frame = response(&mut server, unit, pdu);
+            let frame = server.response(unit, pdu);
             Some(if unit == 1 { frame } else { Vec::new() })
         });
         let ran = At::tcp(line).run("scan --units 1-9");

@@ -4,16 +4,12 @@ use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::{Arc, Mutex};
 use std::thread;
+use std::time::Duration;
 
 use modbus_reference::{Device, Server};
-use modio_description::{checksum, describe};
 use modioctl::bus::adu::{Framing, request_length};
 use register_map::board::MODIO_02;
-use register_map::configuration::MODULE;
-use register_map::state::{
-    BOARD, DESCRIPTION_CRC, FIRMWARE_VERSION, MODULE_IN_FORCE, PRODUCT, PRODUCT_CODE,
-};
-use register_map::{Board, Module, points};
+use register_map::{Board, Module};
 
 /// Serves each connection in a new thread. Returns the address.
 pub fn serve(connection: impl Fn(TcpStream) + Clone + Send + 'static) -> SocketAddr {
@@ -27,6 +23,11 @@ pub fn serve(connection: impl Fn(TcpStream) + Clone + Send + 'static) -> SocketA
         }
     });
     address
+}
+
+/// Serves a unit at every address.
+pub fn serve_unit(mut unit: impl Answers + Send + 'static) -> SocketAddr {
+    serve_requests(move |address, pdu| Some(unit.response(address, pdu)))
 }
 
 /// Serves requests in RTU frames. `answer` gets the unit and the PDU of a request and returns the bytes to send, none
@@ -56,54 +57,75 @@ pub fn serve_requests(
     })
 }
 
-/// Returns the PDU of a server's response, which may be an exception.
-pub fn answer(server: &mut Server, pdu: &[u8]) -> Vec<u8> {
-    let answer = server.answer(pdu);
-    answer.unwrap_or_else(|code| vec![pdu[0] | 0x80, code])
+/// What answers requests.
+pub trait Answers {
+    /// Returns the PDU of the response, or an exception code.
+    fn result(&mut self, pdu: &[u8]) -> Result<Vec<u8>, u8>;
+
+    /// Returns the PDU of the response, which may be an exception.
+    fn answer(&mut self, pdu: &[u8]) -> Vec<u8> {
+        let answer = self.result(pdu);
+        answer.unwrap_or_else(|code| vec![pdu[0] | 0x80, code])
+    }
+
+    /// Returns the frame of the response.
+    fn response(&mut self, unit: u8, pdu: &[u8]) -> Vec<u8> {
+        Framing::Rtu.frame(0, unit, &self.answer(pdu))
+    }
 }
 
-/// Returns the frame of a server's response.
-pub fn response(server: &mut Server, unit: u8, pdu: &[u8]) -> Vec<u8> {
-    Framing::Rtu.frame(0, unit, &answer(server, pdu))
+impl Answers for Server {
+    fn result(&mut self, pdu: &[u8]) -> Result<Vec<u8>, u8> {
+        self.answer(pdu)
+    }
 }
 
-/// Returns a server with these values of registers, without functions 11 and 2B.
-pub fn server(words: impl IntoIterator<Item = (u16, u16)>) -> Server {
-    let mut device = Device {
+/// A modio without functions 11 and 2B. Its time stands still.
+pub struct Modio {
+    pub modio: modbus_reference::Modio,
+    server: Server,
+}
+
+impl Modio {
+    /// A modio-02 with this module, whose description the program knows.
+    pub fn modio_02(module: Module) -> Self {
+        Self::of(&MODIO_02, |_| module)
+    }
+
+    /// A unit of this board with these modules, whose description the program knows. It has run for a while.
+    pub fn of(board: &'static Board, module: impl Fn(u16) -> Module) -> Self {
+        let mut modio = modbus_reference::Modio::new(board, module);
+        modio.now = Duration::from_secs(1000);
+        Self {
+            modio,
+            server: other(),
+        }
+    }
+
+    /// The same with these values of registers, which can only be read.
+    pub fn with(mut self, registers: impl IntoIterator<Item = (u16, u16)>) -> Self {
+        self.modio.fixed.extend(registers);
+        self
+    }
+}
+
+impl Answers for Modio {
+    fn result(&mut self, pdu: &[u8]) -> Result<Vec<u8>, u8> {
+        let of_modio = self.modio.answer(pdu, &self.server.counters);
+        let answer = of_modio.unwrap_or_else(|| self.server.result(pdu));
+        if self.modio.restart {
+            self.modio.start(self.modio.now, false);
+        }
+        answer
+    }
+}
+
+/// Returns a device that is no modio, without functions 11 and 2B.
+pub fn other() -> Server {
+    let device = Device {
         max_word: u16::MAX,
         lacks: vec![0x11, 0x2B],
         ..Device::new(0x20, 0x600)
     };
-    for (address, word) in words {
-        device.words[usize::from(address)] = word;
-    }
     Server::new(None, device)
-}
-
-/// Returns registers of a modio-02 with this module, whose description the program knows.
-pub fn modio_02(module: Module) -> Vec<(u16, u16)> {
-    modio(
-        &MODIO_02,
-        |port| if port == 5 { module } else { Module::None },
-    )
-}
-
-/// Returns registers of this board with these modules, whose description the program knows.
-pub fn modio(board: &Board, module: impl Fn(u16) -> Module) -> Vec<(u16, u16)> {
-    let description = describe(board, "0.1.0", &module);
-    let head = [
-        (PRODUCT_CODE, (PRODUCT >> 16) as u16),
-        (PRODUCT_CODE + 1, PRODUCT as u16),
-        (FIRMWARE_VERSION, 0x0001),
-        (BOARD, board.code),
-        (DESCRIPTION_CRC, checksum(&description.encode())),
-    ];
-    let modules = (1..=points::PORTS).flat_map(|port| {
-        let code = module(port).code();
-        [
-            (MODULE + port - 1, code),
-            (MODULE_IN_FORCE + port - 1, code),
-        ]
-    });
-    head.into_iter().chain(modules).collect()
 }

@@ -39,27 +39,6 @@ fn four_hundred_polls_over_a_line_with_bit_errors_show_no_wrong_value() {
 
 #[test]
 #[ignore = "needs the simulator: cargo xtask test"]
-fn a_unit_that_stops_during_a_command_gives_one_line_and_status_3() {
-    let unit = Unit::with(1, &["--module", "4di"]);
-    let at = At::tcp(unit.tcp);
-    let mut dying = at.start("--timeout 200ms --retries 1 --trace config reset --restart");
-    dying.err.wait_for(REQUEST);
-    unit.post("/api/power", r#"{"on":false}"#);
-    let ran = dying.end();
-    assert_eq!(ran.status, 3, "{ran:?}");
-    let told: Vec<_> = ran
-        .err
-        .lines()
-        .filter(|line| line.starts_with("modioctl: "))
-        .collect();
-    assert!(
-        matches!(told[..], [line] if line.contains("does not answer")),
-        "{ran:?}"
-    );
-}
-
-#[test]
-#[ignore = "needs the simulator: cargo xtask test"]
 fn a_lost_connection_is_status_5_immediately() {
     let unit = Unit::with(1, &["--module", "4di"]);
     let mut cut = At::tcp(unit.tcp).start("--timeout 1h --trace --unit 99 info");

@@ -10,11 +10,10 @@ use modioctl::update::File;
 use register_map::Module;
 use register_map::codes::FaultKind;
 use register_map::fault;
-use register_map::state::{FIRMWARE_VERSION, STATUS, UPDATE};
 use register_map::update::{DEVELOPMENT_KEY, Slot, State};
 
 use crate::program::{At, Ran, has, modioctl};
-use crate::served::{modio_02, response, serve_requests, server};
+use crate::served::{Modio, serve_requests, serve_unit};
 use crate::unit::{Unit, update_file};
 
 #[allow(dead_code, reason = "the tests of the plan use the rest")]
@@ -32,7 +31,7 @@ mod keys;
 /// Blocks of the image.
 const BLOCKS: usize = 100;
 
-/// A line with units, which share the registers that an update does not use.
+/// A line with units.
 struct Line {
     units: Arc<Mutex<Vec<Model>>>,
     /// PDUs of all requests that write.
@@ -53,8 +52,15 @@ impl Line {
     }
 
     fn with(count: u8, change: impl FnMut(&mut Model), echo: bool, cut: usize) -> Self {
+        let fault = [
+            (fault::KIND, FaultKind::Panic.code()),
+            (fault::PROGRAM_COUNTER, 0x0801),
+            (fault::PROGRAM_COUNTER + 1, 0x2344),
+            (fault::UPTIME + 1, 3),
+        ];
         let mut units: Vec<_> = (1..=count).map(Model::new).collect();
         for unit in &mut units {
+            unit.modio.fixed.extend(fault);
             unit.page = Duration::from_millis(2);
             unit.restart = Duration::from_millis(400);
         }
@@ -115,13 +121,6 @@ fn serve(
 ) -> SocketAddr {
     let (units, written) = (Arc::clone(units), Arc::clone(written));
     let begin = Instant::now();
-    let fault = [
-        (fault::KIND, FaultKind::Panic.code()),
-        (fault::PROGRAM_COUNTER, 0x0801),
-        (fault::PROGRAM_COUNTER + 1, 0x2344),
-        (fault::UPTIME + 1, 3),
-    ];
-    let mut server = server(modio_02(Module::Di4).into_iter().chain(fault));
     serve_requests(move |unit, pdu| {
         if matches!(pdu[0], 6 | 0x15) {
             let mut written = written.lock().unwrap();
@@ -131,17 +130,10 @@ fn serve(
             written.push(pdu.to_vec());
         }
         let mut units = units.lock().unwrap();
-        let first = u16::from_be_bytes([pdu[1], pdu[2]]);
-        let is_points =
-            pdu[0] == 1 || (pdu[0] == 3 && ![FIRMWARE_VERSION, STATUS, UPDATE].contains(&first));
         let mut bytes = match echo {
             true => Framing::Rtu.frame(0, unit, pdu),
             false => Vec::new(),
         };
-        if is_points && units.iter().any(|known| known.address == unit) {
-            bytes.extend(response(&mut server, unit, pdu));
-            return Some(bytes);
-        }
         let answers = units
             .iter_mut()
             .filter_map(|known| known.take(unit, pdu, begin.elapsed()));
@@ -217,41 +209,6 @@ fn nothing_is_sent_unless_the_file_suits_every_unit() {
 }
 
 #[test]
-fn a_unit_that_runs_another_image_of_the_same_commit_is_updated() {
-    let line = Line::new(2, |unit| unit.crcs[0] = u32::from(unit.address));
-    let image = File::read(&line.file()).unwrap().images[0].clone();
-    line.units.lock().unwrap().iter_mut().for_each(|unit| {
-        unit.images[0] = image.words;
-        unit.crcs[0] = image.crc ^ u32::from(unit.address == 2);
-    });
-    let text = line.run("update FILE --units 1-2").fine();
-    has(
-        &text,
-        &["unit 1: 0.3.1 (1a2b3c4d) in slot A, it runs that already"],
-    );
-    has(
-        &text,
-        &["unit 2: 0.3.1 (1a2b3c4d) -> 0.3.1 (1a2b3c4d) in slot B, confirmed"],
-    );
-}
-
-#[test]
-fn older_firmware_reports_neither_crc_nor_keys_and_is_updated_each_time() {
-    let line = Line::new(1, |unit| unit.older = true);
-    let text = line.run("update FILE").fine();
-    has(
-        &text,
-        &["unit 1: 0.1.2 (00030004) -> 0.3.1 (1a2b3c4d) in slot B, confirmed"],
-    );
-    // It may run another image of the same commit.
-    let text = line.run("update FILE").fine();
-    has(
-        &text,
-        &["unit 1: 0.3.1 (1a2b3c4d) -> 0.3.1 (1a2b3c4d) in slot A, confirmed"],
-    );
-}
-
-#[test]
 fn what_is_in_a_file_is_shown_without_a_unit() {
     let folder = tempfile::tempdir().unwrap();
     let run = |key, options: &str| {
@@ -307,8 +264,7 @@ fn what_is_in_a_file_is_shown_without_a_unit() {
 #[test]
 fn a_unit_without_a_loader_cannot_be_updated() {
     // Register UPDATE is 0.
-    let mut server = server(modio_02(Module::Di4));
-    let address = serve_requests(move |unit, pdu| Some(response(&mut server, unit, pdu)));
+    let address = serve_unit(Modio::modio_02(Module::Di4));
     let line = Line::new(0, |_| ());
     let at = At::tcp(address);
     for words in ["update FILE", "update --back"] {

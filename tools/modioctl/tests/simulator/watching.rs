@@ -3,21 +3,21 @@
 use std::net::SocketAddr;
 
 use crate::program::At;
-use crate::served::{response, serve_requests, server};
+use crate::served::{Answers, other, serve_requests};
 
 /// Serves a unit that is no modio. Register 7 is the number of its reads. The reads with the numbers 2 and 3 have no
 /// answer; with `hangs_up` the connection is closed instead.
 fn unit(hangs_up: bool) -> SocketAddr {
-    let mut server = server([]);
+    let mut server = other();
     serve_requests(move |unit, pdu| {
         if pdu[0] != 3 || pdu[1..3] != [0, 7] {
-            return Some(response(&mut server, unit, pdu));
+            return Some(server.response(unit, pdu));
         }
         server.device.words[7] += 1;
         match server.device.words[7] {
             2 | 3 if hangs_up => None,
             2 | 3 => Some(Vec::new()),
-            _ => Some(response(&mut server, unit, pdu)),
+            _ => Some(server.response(unit, pdu)),
         }
     })
 }

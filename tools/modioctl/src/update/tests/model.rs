@@ -2,12 +2,12 @@
 
 use std::time::Duration;
 
+use modbus_reference::Modio;
+use register_map::Module;
 use register_map::board::MODIO_02;
 use register_map::codes::Command;
-use register_map::configuration::{COMMAND, KEY, OPENING_KEY};
-use register_map::state::{
-    BOARD, BUILD, COMMIT, FIRMWARE_VERSION, PRODUCT, PRODUCT_CODE, STATUS, UPDATE,
-};
+use register_map::configuration::COMMAND;
+use register_map::state::{BUILD, COMMIT, FIRMWARE_PATCH, FIRMWARE_VERSION, STATUS, UPDATE, build};
 use register_map::update::{BLOCK_BYTES, Header, Reason, Slot, State, block_at};
 
 /// Time in which a block is programmed.
@@ -58,8 +58,6 @@ pub struct Model {
     pub revoked: bool,
     /// The loader accepts a development key.
     pub development: bool,
-    /// Its firmware has no records from the CRC-32s to the bitmap.
-    pub older: bool,
     /// Lowest security epoch that it accepts.
     pub floor: u16,
     /// Time in which a page is erased.
@@ -70,8 +68,9 @@ pub struct Model {
     pub orders: Vec<Command>,
     /// Register STATUS.
     pub status: u16,
+    /// Its registers that an update does not change, its points and its lock.
+    pub modio: Modio,
     reason: u16,
-    is_open: bool,
     erased_at: Duration,
     /// Blocks of the header that was received.
     blocks: usize,
@@ -83,7 +82,7 @@ pub struct Model {
 
 impl Model {
     pub fn new(address: u8) -> Self {
-        Self {
+        let mut model = Self {
             address,
             runs: Slot::A,
             state: State::Empty,
@@ -95,20 +94,21 @@ impl Model {
             keys: [0; 2],
             revoked: false,
             development: false,
-            older: false,
             floor: 0,
             page: Duration::from_millis(50),
             restart: Duration::from_secs(3),
             orders: Vec::new(),
             status: 0,
+            modio: Modio::new(&MODIO_02, |_| Module::Di4),
             reason: 0,
-            is_open: false,
             erased_at: Duration::ZERO,
             blocks: 0,
             staged: Vec::new(),
             silent_until: Duration::ZERO,
             received: 0,
-        }
+        };
+        model.start(Duration::ZERO);
+        model
     }
 
     fn lacks(&self, block: usize, now: Duration) -> bool {
@@ -135,8 +135,6 @@ impl Model {
             }
             8..16 => self.images[0][usize::from(record) - 8],
             16..24 => self.images[1][usize::from(record) - 16],
-            // Zeros, as of all records that it does not know.
-            24..=32 if self.older => 0,
             24..32 => {
                 let longs = [self.crcs, self.keys];
                 let long = longs.as_flattened()[usize::from(record - 24) / 2];
@@ -162,7 +160,7 @@ impl Model {
             0x14 => self.read(pdu, now),
             0x15 => self.write(pdu, now),
             6 => self.order(pdu, now),
-            _ => self.registers(pdu),
+            _ => self.registers(pdu, now),
         };
         let answer = answer.unwrap_or_else(|code| vec![pdu[0] | 0x80, code]);
         (unit != 0 || self.flaw == Flaw::AnswersBroadcasts).then_some(answer)
@@ -250,11 +248,10 @@ impl Model {
 
     fn order(&mut self, pdu: &[u8], now: Duration) -> Result<Vec<u8>, u8> {
         let [address, word] = [1, 3].map(|at| u16::from_be_bytes([pdu[at], pdu[at + 1]]));
-        if address == KEY {
-            self.is_open = word == OPENING_KEY;
-            return Ok(pdu.to_vec());
+        let answer = self.registers(pdu, now)?;
+        if address != COMMAND {
+            return Ok(answer);
         }
-        assert_eq!(address, COMMAND);
         let is_whole = self.blocks > 0 && self.content.iter().all(Option::is_some);
         let may_finish = match self.state {
             State::Receiving => is_whole,
@@ -262,9 +259,6 @@ impl Model {
             _ => false,
         };
         let command = Command::from_code(word).unwrap();
-        if !self.is_open {
-            return Err(6);
-        }
         self.orders.push(command);
         match command {
             Command::Prepare if !self.trial => {
@@ -303,7 +297,7 @@ impl Model {
             }
             _ => return Err(6),
         }
-        Ok(pdu.to_vec())
+        Ok(answer)
     }
 
     /// Starts the image in the other slot, on trial.
@@ -314,28 +308,34 @@ impl Model {
         self.crcs.swap(0, 1);
         self.state = State::Confirmed;
         self.trial = true;
-        self.is_open = false;
+        self.start(now);
     }
 
-    fn registers(&self, pdu: &[u8]) -> Result<Vec<u8>, u8> {
-        let [first, count] = [1, 3].map(|at| u16::from_be_bytes([pdu[at], pdu[at + 1]]));
+    /// Starts the running image.
+    fn start(&mut self, now: Duration) {
+        self.set_registers();
+        self.modio.start(now, false);
+    }
+
+    /// Serves points and registers.
+    fn registers(&mut self, pdu: &[u8], now: Duration) -> Result<Vec<u8>, u8> {
+        self.set_registers();
+        self.modio.now = now;
+        self.modio.answer(pdu, &[0; 9]).unwrap_or(Err(1))
+    }
+
+    fn set_registers(&mut self) {
         let [version, patch, _, high, low, ..] = self.images[0];
-        let register = |address: u16| match address {
-            PRODUCT_CODE => (PRODUCT >> 16) as u16,
-            0x0201 => PRODUCT as u16,
-            FIRMWARE_VERSION => version,
-            0x0203 => patch,
-            BOARD => MODIO_02.code,
-            STATUS => self.status,
-            COMMIT => high,
-            0x020D => low,
-            BUILD => u16::from(self.development) << 3,
-            UPDATE => (self.runs as u16 + 1) | u16::from(self.trial) << 5,
-            _ => 0,
-        };
-        let words = (first..first + count).map(register);
-        let mut answer = vec![3, 2 * count as u8];
-        answer.extend(words.flat_map(u16::to_be_bytes));
-        Ok(answer)
+        let key = u16::from(self.development) * build::DEVELOPMENT_TRUSTED;
+        let trial = u16::from(self.trial) << 5;
+        self.modio.fixed.extend([
+            (FIRMWARE_VERSION, version),
+            (FIRMWARE_PATCH, patch),
+            (STATUS, self.status),
+            (COMMIT, high),
+            (COMMIT + 1, low),
+            (BUILD, key),
+            (UPDATE, (self.runs as u16 + 1) | trial),
+        ]);
     }
 }
