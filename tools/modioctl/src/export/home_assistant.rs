@@ -5,10 +5,10 @@
 //! `modbus.write_register`.
 
 use modio_description::Table;
-use serde::Serialize;
+use serde_yaml_ng::Mapping;
 
-use super::{Line, Scaling, Source, identifier, no_ascii_over_tcp, plain, power, yaml};
-use crate::bus::adu::Framing;
+use super::yaml::{self, map};
+use super::{Line, Scaling, Source, identifier, no_ascii_over_tcp, plain, power};
 use crate::bus::endpoint::host_and_port;
 use crate::bus::{Endpoint, Place};
 use crate::failure::Failure;
@@ -18,165 +18,40 @@ use crate::value::unit_name;
 /// Interval between two readings of a diagnostic value, in seconds.
 const SLOWLY: u16 = 60;
 
-#[derive(Serialize)]
-struct File {
-    modbus: [Hub; 1],
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    template: Vec<Template>,
-}
-
-#[derive(Serialize)]
-struct Hub {
-    name: String,
-    #[serde(flatten)]
-    connection: Connection,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    message_wait_milliseconds: Option<u64>,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    sensors: Vec<Sensor>,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    binary_sensors: Vec<BinarySensor>,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    switches: Vec<Switch>,
-}
-
-#[derive(Serialize)]
-#[serde(untagged)]
-enum Connection {
-    Serial {
-        r#type: &'static str,
-        port: String,
-        baudrate: u32,
-        bytesize: u8,
-        method: Framing,
-        parity: char,
-        stopbits: u8,
-    },
-    Network {
-        r#type: &'static str,
-        host: String,
-        port: u16,
-    },
-}
-
-#[derive(Serialize)]
-struct Entity {
-    name: String,
-    unique_id: String,
-    slave: u8,
-    address: u16,
-}
-
-#[derive(Serialize)]
-struct Sensor {
-    #[serde(flatten)]
-    entity: Entity,
-    input_type: &'static str,
-    data_type: String,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    scale: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    offset: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    precision: Option<u8>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    unit_of_measurement: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    device_class: Option<&'static str>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    state_class: Option<&'static str>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    scan_interval: Option<u16>,
-}
-
-#[derive(Serialize)]
-struct BinarySensor {
-    #[serde(flatten)]
-    entity: Entity,
-    input_type: &'static str,
-}
-
-#[derive(Serialize)]
-struct Switch {
-    #[serde(flatten)]
-    entity: Entity,
-    write_type: &'static str,
-    command_on: u8,
-    command_off: u8,
-    verify: Verify,
-}
-
-#[derive(Serialize)]
-struct Verify {
-    input_type: &'static str,
-}
-
-#[derive(Serialize)]
-struct Template {
-    number: Vec<Number>,
-}
-
-#[derive(Serialize)]
-struct Number {
-    name: String,
-    unique_id: String,
-    state: String,
-    availability: String,
-    min: f64,
-    max: f64,
-    step: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    unit_of_measurement: Option<String>,
-    set_value: [Action; 1],
-}
-
-#[derive(Serialize)]
-struct Action {
-    action: &'static str,
-    data: Write,
-}
-
-#[derive(Serialize)]
-struct Write {
-    hub: String,
-    slave: u8,
-    address: u16,
-    value: String,
-}
+/// Sensors, binary sensors, switches, and numbers of the integration `template`.
+type Entities = [Vec<Mapping>; 4];
 
 /// Returns the YAML text. All units of the line are entities of one hub: Home Assistant ignores every further hub with
 /// the same serial port, or with the same host and port.
 pub fn text(line: Line<'_>) -> Result<String, Failure> {
     no_ascii_over_tcp("Home Assistant", line.endpoint)?;
     let title = line.title()?;
-    let mut hub = Hub {
-        name: identifier(&title),
-        connection: connection(line.endpoint)?,
-        // Home Assistant leaves 30 ms on a serial port, and nothing elsewhere.
-        message_wait_milliseconds: line
-            .silence()
-            .filter(|silence| *silence > 30 || !line.endpoint.place.is_serial()),
-        sensors: Vec::new(),
-        binary_sensors: Vec::new(),
-        switches: Vec::new(),
-    };
-    let mut numbers = Vec::new();
+    let name = identifier(&title);
+    let mut all = Entities::default();
     for source in line.units {
         let unit = Unit {
             name: &line.unit_name(source)?,
             address: source.unit,
         };
-        numbers.extend(entities(&mut hub, source, unit));
+        for (all, of_unit) in all.iter_mut().zip(entities(&name, source, unit)) {
+            all.extend(of_unit);
+        }
     }
-    let file = File {
-        modbus: [hub],
-        template: if numbers.is_empty() {
-            Vec::new()
-        } else {
-            vec![Template { number: numbers }]
-        },
-    };
-    let yaml = yaml::text(&file)?;
+    let [sensors, binary_sensors, switches, numbers] = all;
+    // Home Assistant leaves 30 ms on a serial port, and nothing elsewhere.
+    let wait = line
+        .silence()
+        .filter(|silence| *silence > 30 || !line.endpoint.place.is_serial());
+    let mut hub = map! { "name": name };
+    hub.extend(connection(line.endpoint)?);
+    hub.extend(map! {
+        "message_wait_milliseconds": wait,
+        "sensors": sensors,
+        "binary_sensors": binary_sensors,
+        "switches": switches,
+    });
+    let template = (!numbers.is_empty()).then(|| [map! { "number": numbers }]);
+    let yaml = yaml::text(&map! { "modbus": [hub], "template": template })?;
     Ok(format!(
         "# Home Assistant configuration for {title}, written by `modioctl export home-assistant`.\n{yaml}"
     ))
@@ -188,90 +63,100 @@ struct Unit<'a> {
     address: u8,
 }
 
-/// Adds the entities of a unit to its hub, and returns its numbers.
-fn entities(hub: &mut Hub, source: &Source, unit: Unit<'_>) -> Vec<Number> {
+/// Returns the entities of a unit.
+fn entities(hub: &str, source: &Source, unit: Unit<'_>) -> Entities {
     let points = || source.book.points();
-    let words = points().filter(|item| item.table == Table::Word);
-    hub.sensors.extend(words.map(|item| sensor(item, unit)));
-    hub.sensors.extend(source.counters().map(|item| Sensor {
-        state_class: Some("total_increasing"),
-        ..sensor(item, unit)
-    }));
-    hub.sensors.extend(source.diagnostics().map(|item| Sensor {
-        scan_interval: Some(SLOWLY),
-        ..sensor(item, unit)
-    }));
-    let bits = || points().filter(|item| item.table == Table::Bit);
-    let sensors = bits().filter(|item| !source.can_set(item));
-    hub.binary_sensors.extend(sensors.map(|item| BinarySensor {
-        entity: entity(item, unit),
-        input_type: if item.writable {
-            "coil"
-        } else {
-            "discrete_input"
-        },
-    }));
-    let switches = bits().filter(|item| source.can_set(item));
-    hub.switches.extend(switches.map(|item| Switch {
-        entity: entity(item, unit),
-        write_type: "coil",
-        command_on: 1,
-        command_off: 0,
-        verify: Verify { input_type: "coil" },
-    }));
-    let outputs = points().filter(|item| item.table == Table::Word && item.writable);
-    outputs.map(|item| number(item, unit, &hub.name)).collect()
+    let words = || points().filter(|item| item.table == Table::Word);
+    let mut sensors: Vec<_> = words().map(|item| sensor(item, unit)).collect();
+    let with = |item: &Item, more: Mapping| {
+        let mut sensor = sensor(item, unit);
+        sensor.extend(more);
+        sensor
+    };
+    let counters = source.counters();
+    sensors.extend(counters.map(|item| with(item, map! { "state_class": "total_increasing" })));
+    let diagnostics = source.diagnostics();
+    sensors.extend(diagnostics.map(|item| with(item, map! { "scan_interval": SLOWLY })));
+    let bit = |item: &Item| {
+        let mut bit = entity(item, unit);
+        bit.extend(match (source.can_set(item), item.writable) {
+            (true, _) => map! {
+                "write_type": "coil",
+                "command_on": 1,
+                "command_off": 0,
+                "verify": map! { "input_type": "coil" },
+            },
+            (false, true) => map! { "input_type": "coil" },
+            (false, false) => map! { "input_type": "discrete_input" },
+        });
+        bit
+    };
+    let bits = points().filter(|item| item.table == Table::Bit);
+    let (switches, inputs): (Vec<_>, Vec<_>) = bits.partition(|item| source.can_set(item));
+    [
+        sensors,
+        inputs.into_iter().map(bit).collect(),
+        switches.into_iter().map(bit).collect(),
+        words()
+            .filter(|item| item.writable)
+            .map(|item| number(item, unit, hub))
+            .collect(),
+    ]
 }
 
-fn connection(endpoint: &Endpoint) -> Result<Connection, Failure> {
+fn connection(endpoint: &Endpoint) -> Result<Mapping, Failure> {
     let network = |r#type, address: &str| {
         let (host, port) = host_and_port(address).map_err(Failure::usage)?;
-        Ok(Connection::Network { r#type, host, port })
+        Ok(map! { "type": r#type, "host": host, "port": port })
     };
     match &endpoint.place {
-        Place::Serial(port) => Ok(Connection::Serial {
-            r#type: "serial",
-            port: port.clone(),
-            baudrate: endpoint.baud,
-            bytesize: endpoint.format.data_bits,
-            method: endpoint.framing,
-            parity: endpoint.format.parity.letter(),
-            stopbits: endpoint.format.stop_bits,
+        Place::Serial(port) => Ok(map! {
+            "type": "serial",
+            "port": port,
+            "baudrate": endpoint.baud,
+            "bytesize": endpoint.format.data_bits,
+            "method": endpoint.framing,
+            "parity": endpoint.format.parity.letter(),
+            "stopbits": endpoint.format.stop_bits,
         }),
         Place::Tcp(address) => network("rtuovertcp", address),
         Place::ModbusTcp(address) => network("tcp", address),
     }
 }
 
-fn entity(item: &Item, unit: Unit<'_>) -> Entity {
-    let name = format!("{} {}", unit.name, plain(&item.name));
-    Entity {
-        unique_id: identifier(&name),
-        name,
-        slave: unit.address,
-        address: item.address,
+fn name(item: &Item, unit: Unit<'_>) -> String {
+    format!("{} {}", unit.name, plain(&item.name))
+}
+
+fn entity(item: &Item, unit: Unit<'_>) -> Mapping {
+    let name = name(item, unit);
+    map! {
+        "name": name,
+        "unique_id": identifier(&name),
+        "slave": unit.address,
+        "address": item.address,
     }
 }
 
-fn sensor(item: &Item, unit: Unit<'_>) -> Sensor {
+fn sensor(item: &Item, unit: Unit<'_>) -> Mapping {
     let scaling = Scaling::of(item);
     let shown = shown(&scaling);
     let offset = f64::from(scaling.unit.offset) * shown.factor;
-    Sensor {
-        entity: entity(item, unit),
-        input_type: if item.writable { "holding" } else { "input" },
-        data_type: scaling.data_type(item).to_lowercase(),
-        scale: (shown.exponent != 0).then_some(shown.factor),
-        offset: (scaling.unit.offset != 0).then_some(offset),
-        precision: (shown.exponent < 0).then(|| shown.exponent.unsigned_abs()),
-        unit_of_measurement: shown.unit,
-        device_class: shown.device_class,
-        state_class: matches!(item.meaning, Meaning::Analog(_)).then_some("measurement"),
-        scan_interval: None,
-    }
+    let mut sensor = entity(item, unit);
+    sensor.extend(map! {
+        "input_type": if item.writable { "holding" } else { "input" },
+        "data_type": scaling.data_type(item).to_lowercase(),
+        "scale": (shown.exponent != 0).then_some(shown.factor),
+        "offset": (scaling.unit.offset != 0).then_some(offset),
+        "precision": (shown.exponent < 0).then(|| shown.exponent.unsigned_abs()),
+        "unit_of_measurement": shown.unit,
+        "device_class": shown.device_class,
+        "state_class": matches!(item.meaning, Meaning::Analog(_)).then_some("measurement"),
+    });
+    sensor
 }
 
-fn number(item: &Item, unit: Unit<'_>, hub: &str) -> Number {
+fn number(item: &Item, unit: Unit<'_>, hub: &str) -> Mapping {
     let scaling = Scaling::of(item);
     let shown = shown(&scaling);
     let offset = scaling.unit.offset;
@@ -285,10 +170,9 @@ fn number(item: &Item, unit: Unit<'_>, hub: &str) -> Number {
             steps * shown.factor
         }
     };
-    let Entity {
-        name, unique_id, ..
-    } = entity(item, unit);
-    let sensor = format!("sensor.{unique_id}");
+    let name = name(item, unit);
+    let id = identifier(&name);
+    let sensor = format!("sensor.{id}");
     let mut value = match shown.factor {
         1.0 => "value | round | int".to_owned(),
         factor => format!("(value / {factor}) | round | int"),
@@ -300,25 +184,22 @@ fn number(item: &Item, unit: Unit<'_>, hub: &str) -> Number {
         // A value below 0 is written in two's complement.
         value = format!("({value}) % 65536");
     }
-    let value = format!("{{{{ {value} }}}}");
-    Number {
-        unique_id: format!("{unique_id}_set"),
-        name: format!("{name} set"),
-        state: format!("{{{{ states('{sensor}') }}}}"),
-        availability: format!("{{{{ has_value('{sensor}') }}}}"),
-        min: quantity(min),
-        max: quantity(max),
-        step: shown.factor,
-        unit_of_measurement: shown.unit.clone(),
-        set_value: [Action {
-            action: "modbus.write_register",
-            data: Write {
-                hub: hub.to_owned(),
-                slave: unit.address,
-                address: item.address,
-                value,
-            },
-        }],
+    let write = map! {
+        "hub": hub,
+        "slave": unit.address,
+        "address": item.address,
+        "value": format!("{{{{ {value} }}}}"),
+    };
+    map! {
+        "name": format!("{name} set"),
+        "unique_id": format!("{id}_set"),
+        "state": format!("{{{{ states('{sensor}') }}}}"),
+        "availability": format!("{{{{ has_value('{sensor}') }}}}"),
+        "min": quantity(min),
+        "max": quantity(max),
+        "step": shown.factor,
+        "unit_of_measurement": shown.unit,
+        "set_value": [map! { "action": "modbus.write_register", "data": write }],
     }
 }
 

@@ -19,16 +19,6 @@ use crate::names::{Item, Meaning};
 
 /// TOML has no value for `None`: the serialiser leaves such an entry out.
 #[derive(Serialize)]
-struct File {
-    inputs: Inputs,
-}
-
-#[derive(Serialize)]
-struct Inputs {
-    modbus: Vec<Modbus>,
-}
-
-#[derive(Serialize)]
 struct Modbus {
     name: String,
     timeout: String,
@@ -41,12 +31,7 @@ struct Modbus {
     transmission_mode: &'static str,
     configuration_type: &'static str,
     metric: Vec<Metric>,
-    workarounds: Option<Workarounds>,
-}
-
-#[derive(Serialize)]
-struct Workarounds {
-    pause_between_requests: String,
+    workarounds: Option<BTreeMap<&'static str, String>>,
 }
 
 #[derive(Serialize)]
@@ -81,11 +66,8 @@ pub fn text(line: Line<'_>) -> Result<String, Failure> {
         _ => vec![modbus(line, &name, |_| true)?],
     };
     let modbus = modbus.into_iter().filter(|input| !input.metric.is_empty());
-    let file = File {
-        inputs: Inputs {
-            modbus: modbus.collect(),
-        },
-    };
+    let inputs = BTreeMap::from([("modbus", modbus.collect::<Vec<_>>())]);
+    let file = BTreeMap::from([("inputs", inputs)]);
     let toml = toml::to_string(&file).map_err(Failure::usage)?;
     Ok(format!(
         "# Telegraf input for {name}, written by `modioctl export telegraf`.\n\n{toml}"
@@ -127,9 +109,9 @@ fn modbus(
         transmission_mode,
         configuration_type: "metric",
         metric: metrics,
-        workarounds: line.silence().map(|silence| Workarounds {
-            pause_between_requests: format!("{silence}ms"),
-        }),
+        workarounds: line
+            .silence()
+            .map(|silence| BTreeMap::from([("pause_between_requests", format!("{silence}ms"))])),
     })
 }
 

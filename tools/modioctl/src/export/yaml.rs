@@ -2,9 +2,28 @@
 //! boolean, and `1.0` and `1_000` for numbers.
 
 use serde::Serialize;
-use serde_yaml_ng::{Number, Value};
+use serde_yaml_ng::{Mapping, Number, Value};
 
 use crate::failure::Failure;
+
+/// Returns a mapping of these keys and values, without the keys that have no value or an empty list.
+macro_rules! map {
+    ($($key:literal: $value:expr),+ $(,)?) => {
+        crate::export::yaml::mapping([$(($key, serde_yaml_ng::to_value(&$value))),+])
+    };
+}
+pub(super) use map;
+
+/// Returns the mapping of [`map`]. Every value can be written as YAML.
+pub fn mapping<const N: usize>(
+    entries: [(&str, Result<Value, serde_yaml_ng::Error>); N],
+) -> Mapping {
+    let entries = entries.map(|(key, value)| (key.into(), value.unwrap_or_default()));
+    let is_empty =
+        |value: &Value| value.is_null() || value.as_sequence().is_some_and(Vec::is_empty);
+    let entries = entries.into_iter().filter(|(_, value)| !is_empty(value));
+    entries.collect()
+}
 
 /// Returns a value as YAML.
 pub fn text(value: &impl Serialize) -> Result<String, Failure> {
