@@ -5,14 +5,20 @@
 
 #![forbid(unsafe_code)]
 
-/// Prints a line on standard error, in place of the macro of the standard library, which panics when standard error is
-/// closed. Nobody reads the line then, and the command goes on.
+/// Prints on standard error, in place of the macro of the standard library, which panics when standard error is closed.
+/// Nobody reads the text then, and the command goes on.
 #[macro_export]
-macro_rules! eprintln {
+macro_rules! eprint {
     ($($text:tt)*) => {{
         use std::io::Write as _;
-        let _ = writeln!(std::io::stderr(), $($text)*);
+        let _ = write!(std::io::stderr(), $($text)*);
     }};
+}
+
+/// Prints a line as [`eprint!`] does.
+#[macro_export]
+macro_rules! eprintln {
+    ($($text:tt)*) => { $crate::eprint!("{}\n", format_args!($($text)*)) };
 }
 
 mod adapter;

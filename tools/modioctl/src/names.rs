@@ -4,15 +4,11 @@ use modio_description::{
     Description, ModuleType, PointKind, Reading, Register, Scope, Table, Unit, Value, Values,
 };
 
+use register_map::Board;
 use register_map::configuration::MODULE;
-use register_map::{Board, points};
+use register_map::points::{CHANNELS, COUNT, PORTS};
 
 use crate::failure::Failure;
-
-/// Number of points of a port.
-const CHANNELS: u16 = 4;
-/// Number of points of all ports.
-const POINTS: u16 = 8 * CHANNELS;
 
 /// An item that can be read: a point, a register, or an address without known meaning.
 #[derive(Clone, Debug, PartialEq)]
@@ -352,7 +348,7 @@ fn registers(description: &Description, register: &Register) -> Vec<Item> {
             .map(|(port, channel, kind, row)| {
                 let number = row.map(|row| (row + 1).to_string()).unwrap_or_default();
                 let name = format!("p{port}.{channel}.{name}{number}");
-                let index = row.unwrap_or_default() * POINTS + point(port, channel);
+                let index = row.unwrap_or_default() * COUNT + point(port, channel);
                 let mut item = item(name, index);
                 let narrower = register.narrower.as_ref().filter(|narrower| {
                     description.kinds.get(usize::from(narrower.kind)) == Some(kind)
@@ -376,7 +372,7 @@ fn points_of<'a>(
     description: &'a Description,
     register: &'a Register,
 ) -> impl Iterator<Item = (u16, u16, &'a PointKind, Option<u16>)> {
-    let rows = register.count / register.value.registers().saturating_mul(POINTS).max(1);
+    let rows = register.count / register.value.registers().saturating_mul(COUNT).max(1);
     let of_kind = match &register.value {
         Value::Fields { kind, .. } => description.kinds.get(usize::from(*kind)),
         _ => None,
@@ -390,7 +386,7 @@ fn points_of<'a>(
 
 /// Returns whether an item is MODULE of a port.
 pub fn is_module(item: &Item) -> bool {
-    (MODULE..MODULE + points::PORTS).contains(&item.address)
+    (MODULE..MODULE + PORTS).contains(&item.address)
 }
 
 /// Returns whether a writable register is a setting, and not the lock, a command, a heartbeat or a counter.

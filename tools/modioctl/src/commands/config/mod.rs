@@ -2,7 +2,7 @@
 
 mod file;
 
-use std::io::{IsTerminal, Write as _, stderr, stdin};
+use std::io::{IsTerminal, stdin};
 use std::path::Path;
 
 use register_map::codes::Command;
@@ -206,8 +206,7 @@ fn table(mut rows: Vec<[String; 3]>, other: &str) -> Result<(), Failure> {
 async fn agree(modules: &str) -> Result<(), Failure> {
     let mut answer = String::new();
     if stdin().is_terminal() {
-        let question = format_args!("modioctl: {modules} changes: write all of this? [y/N] ");
-        let _ = write!(stderr(), "{question}");
+        eprint!("modioctl: {modules} changes: write all of this? [y/N] ");
         let (tell, told) = tokio::sync::oneshot::channel();
         // Ctrl-C ends the program while this thread waits for a line.
         std::thread::spawn(move || {

@@ -31,6 +31,20 @@ fn screen(model: &mut Model, width: u16, height: u16, now: Instant) -> Vec<Strin
     .collect()
 }
 
+/// Returns a display of a modio-08 with relays, and these values.
+fn relays(now: Instant, values: &[(&str, Vec<u16>)]) -> Model {
+    let mut model = model(Module::Do4, now);
+    let relays = Box::new(book(&MODIO_08, Module::Relay2, (0, 0)));
+    model.update(Update::Learned(relays), now);
+    let mut round = polled(now, &[]);
+    let values = values.iter().cloned();
+    round
+        .words
+        .extend(values.map(|(name, words)| (name.to_owned(), words)));
+    model.update(Update::Polled(round), now);
+    model
+}
+
 fn seconds(now: Instant, seconds: u64) -> Instant {
     now + Duration::from_secs(seconds)
 }
@@ -185,17 +199,12 @@ fn large_board_scrolls_and_a_large_terminal_shows_counters_beside_the_tree() {
 #[test]
 fn links_are_shown_at_their_output_and_their_input() {
     let now = Instant::now();
-    let mut model = model(Module::Do4, now);
-    let relays = Box::new(book(&MODIO_08, Module::Relay2, (0, 0)));
-    model.update(Update::Learned(relays), now);
-    let mut round = polled(now, &[]);
     // The jumper p1.1 toggles the coil p1.3.
-    for (link, words) in [("1", [0, 3, 0, 0]), ("2", [0xFFFF, 0, 0, 0])] {
-        round
-            .words
-            .insert(format!("p1.3.link{link}"), words.to_vec());
-    }
-    model.update(Update::Polled(round), now);
+    let links = [
+        ("p1.3.link1", vec![0, 3, 0, 0]),
+        ("p1.3.link2", vec![0xFFFF, 0, 0, 0]),
+    ];
+    let mut model = relays(now, &links);
     for (row, count) in [(1, 1), (2, 0), (3, 1)] {
         model.tree.select(row);
         let text = screen(&mut model, 80, 24, now).join("\n");
@@ -206,21 +215,15 @@ fn links_are_shown_at_their_output_and_their_input() {
 #[test]
 fn output_that_a_link_holds_is_marked_and_a_write_to_it_says_so() {
     let now = Instant::now();
-    let mut model = model(Module::Do4, now);
-    let relays = Box::new(book(&MODIO_08, Module::Relay2, (0, 0)));
-    model.update(Update::Learned(relays), now);
-    let mut round = polled(now, &[]);
-    for (name, words) in [
+    let values = [
         ("p1.3", vec![1]),
         ("p1.3.channel_status", vec![0]),
         // The jumper p1.1 holds the coil p1.3.
         ("p1.3.link1", vec![0, 1, 0, 0]),
         ("p1.4", vec![1]),
         ("p1.4.link1", vec![0, 3, 0, 0]),
-    ] {
-        round.words.insert(name.to_owned(), words);
-    }
-    model.update(Update::Polled(round), now);
+    ];
+    let mut model = relays(now, &values);
     model.tree.select(3);
     let rows = screen(&mut model, 120, 40, now);
     let row = |name: &str| {
