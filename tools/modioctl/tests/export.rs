@@ -388,31 +388,6 @@ fn items_with_the_same_id_are_refused() {
 }
 
 #[test]
-fn pulses_of_inputs_are_counters() {
-    let read = |format| parsed(format, &export_of(format, &modio_02(Module::Di4)));
-    let sensors = list(&read(HomeAssistant), "/modbus/0/sensors");
-    let counters = with(&sensors, &[("state_class", "total_increasing")]);
-    assert_eq!(counters.len(), 4);
-    assert_eq!(counters[1]["name"], "modio-02 1 p5.2.pulses");
-    assert_eq!(counters[1]["address"], 0x0322);
-    assert_eq!(counters[1]["data_type"], "uint32");
-
-    let nodes = list(&read(NodeRed), "");
-    let read_node = with(&nodes, &[("type", "modbus-read"), ("adr", "800")])[0];
-    assert_eq!(
-        (&read_node["quantity"], &read_node["rate"]),
-        (&"8".into(), &"10".into())
-    );
-
-    let fields = list(&read(Telegraf), "/inputs/modbus/0/metric/0/fields");
-    let mut pulses = fields.clone();
-    pulses.retain(|field| field["name"].as_str().unwrap().ends_with("_pulses"));
-    assert_eq!(texts_of(&pulses, "type"), ["UINT32"; 4]);
-    // Outputs and analog points have registers for pulses, too, which stay at 0.
-    assert!(!export_of(Telegraf, &analog()).contains("pulses"));
-}
-
-#[test]
 fn node_red_reads_each_port_with_its_own_request() {
     let nodes = list(&parsed(NodeRed, &export_of(NodeRed, &digital())), "");
     let coils = with(&nodes, &[("type", "modbus-read"), ("dataType", "Coil")]);

@@ -17,33 +17,48 @@ use crate::served::{Answers, Modio, other, serve_requests};
 
 const MS: Duration = Duration::from_millis(1);
 
-/// Serves these units over TCP with RTU frames.
-fn units(addresses: &'static [u8]) -> SocketAddr {
-    let mut server = modio();
+/// What a request gets.
+enum Reply {
+    Answer,
+    Exception(u8),
+    Nothing,
+}
+use Reply::{Answer, Exception, Nothing};
+
+/// Serves a modio-02 with a loader over TCP with RTU frames. `reply` says what each request to an address gets.
+fn line(mut reply: impl FnMut(u8, &[u8]) -> Reply + Send + 'static) -> SocketAddr {
+    let mut modio = Modio::modio_02(Module::Di4).with([(UPDATE, 1)]);
     serve_requests(move |unit, pdu| {
-        Some(match addresses.contains(&unit) {
-            true => server.response(unit, pdu),
-            false => Vec::new(),
+        Some(match reply(unit, pdu) {
+            Answer => modio.response(unit, pdu),
+            Exception(code) => Framing::Rtu.frame(0, unit, &[pdu[0] | 0x80, code]),
+            Nothing => Vec::new(),
         })
     })
 }
 
-/// Returns a modio-02 with a loader.
-fn modio() -> Modio {
-    Modio::modio_02(Module::Di4).with([(UPDATE, 1)])
+/// Serves units with these addresses.
+fn units(addresses: &'static [u8]) -> SocketAddr {
+    line(|unit, _| {
+        if addresses.contains(&unit) {
+            Answer
+        } else {
+            Nothing
+        }
+    })
 }
 
 #[test]
 fn exceptions_0a_and_0b_are_asked_again_on_every_line() {
     for code in [0x0A, 0x0B] {
-        let mut server = modio();
         let mut requests = 0;
-        let line = serve_requests(move |unit, pdu| {
+        let line = line(move |_, _| {
             requests += 1;
-            Some(match requests % 3 {
-                0 => server.response(unit, pdu),
-                _ => Framing::Rtu.frame(0, unit, &[pdu[0] | 0x80, code]),
-            })
+            if requests % 3 == 0 {
+                Answer
+            } else {
+                Exception(code)
+            }
         });
         for at in [
             At::tcp(line),
@@ -59,9 +74,9 @@ fn exceptions_0a_and_0b_are_asked_again_on_every_line() {
 fn a_unit_that_no_try_finds_behind_a_gateway_is_status_3() {
     let requests = Arc::new(Mutex::new(0));
     let count = Arc::clone(&requests);
-    let line = serve_requests(move |_, _| {
+    let line = line(move |_, _| {
         *count.lock().unwrap() += 1;
-        Some(Vec::new())
+        Nothing
     });
     let gateway = Gateway::waiting(30 * MS);
     let text = At::modbus_tcp(gateway.before(line)).run("read 0").failed(3);
@@ -81,9 +96,7 @@ fn a_read_is_repeated_while_the_unit_or_the_gateway_is_busy() {
         };
         let at = At::modbus_tcp(busy.before(units(&[1])));
         assert_eq!(at.run("read p5.1").fine(), "p5.1  off\n", "{code:02X}");
-        let always = serve_requests(move |unit, pdu| {
-            Some(Framing::Rtu.frame(0, unit, &[pdu[0] | 0x80, code]))
-        });
+        let always = line(move |_, _| Exception(code));
         for words in ["read p5.1", "update --status"] {
             let text = At::tcp(always)
                 .run(&format!("--retries 1 {words}"))
@@ -96,14 +109,10 @@ fn a_read_is_repeated_while_the_unit_or_the_gateway_is_busy() {
 
 #[test]
 fn busy_is_asked_again_without_retries() {
-    let mut server = modio();
     let mut is_busy = false;
-    let line = serve_requests(move |unit, pdu| {
+    let line = line(move |_, _| {
         is_busy = !is_busy;
-        Some(match is_busy {
-            true => Framing::Rtu.frame(0, unit, &[pdu[0] | 0x80, 6]),
-            false => server.response(unit, pdu),
-        })
+        if is_busy { Exception(6) } else { Answer }
     });
     let text = At::tcp(line).run("--retries 0 read p5.1").fine();
     assert_eq!(text, "p5.1  off\n");
@@ -126,15 +135,14 @@ fn a_scan_waits_for_the_late_answers_of_a_gateway() {
 /// After a bit error the gateway reports a unit that is there as absent.
 #[test]
 fn a_scan_over_modbus_tcp_asks_again_and_counts_the_silent_addresses() {
-    let mut server = modio();
     let mut asked = [0; 7];
-    let line = serve_requests(move |unit, pdu| {
+    let line = line(move |unit, _| {
         asked[usize::from(unit)] += 1;
-        Some(match (unit, asked[usize::from(unit)]) {
-            (5, 1) => Framing::Rtu.frame(0, unit, &[pdu[0] | 0x80, 0x0B]),
-            (2 | 5, _) => server.response(unit, pdu),
-            _ => Vec::new(),
-        })
+        match (unit, asked[usize::from(unit)]) {
+            (5, 1) => Exception(0x0B),
+            (2 | 5, _) => Answer,
+            _ => Nothing,
+        }
     });
     let gateway = Gateway::waiting(200 * MS);
     let ran = At::modbus_tcp(gateway.before(line)).run("scan --units 1-6");
@@ -146,15 +154,14 @@ fn a_scan_over_modbus_tcp_asks_again_and_counts_the_silent_addresses() {
 
 #[test]
 fn an_address_that_is_busy_and_then_silent_is_named_by_a_scan() {
-    let mut server = modio();
     let mut asked = 0;
-    let line = serve_requests(move |unit, pdu| {
+    let line = line(move |unit, _| {
         asked += i32::from(unit == 2);
-        Some(match unit {
-            1 => server.response(unit, pdu),
-            2 if asked == 1 => Framing::Rtu.frame(0, unit, &[pdu[0] | 0x80, 6]),
-            _ => Vec::new(),
-        })
+        match unit {
+            1 => Answer,
+            2 if asked == 1 => Exception(6),
+            _ => Nothing,
+        }
     });
     let gateway = Gateway::waiting(200 * MS);
     let ran = At::modbus_tcp(gateway.before(line)).run("scan --units 1-3");
@@ -163,11 +170,9 @@ fn an_address_that_is_busy_and_then_silent_is_named_by_a_scan() {
 
 #[test]
 fn a_gateway_that_passes_only_standard_functions_creates_no_units() {
-    let wait = 20 * MS;
     let gateway = Gateway {
         only_standard: true,
-        wait,
-        ..Gateway::default()
+        ..Gateway::waiting(20 * MS)
     };
     let at = At::modbus_tcp(gateway.before(units(&[3])));
     let text = at.run("scan --units 1-5").fine();
@@ -178,13 +183,10 @@ fn a_gateway_that_passes_only_standard_functions_creates_no_units() {
 /// Gateways that speak RTU answer for a missing unit as those for Modbus TCP do.
 #[test]
 fn a_gateway_with_rtu_frames_that_passes_only_standard_functions_creates_no_units() {
-    let mut server = modio();
-    let line = serve_requests(move |unit, pdu| {
-        Some(match (unit, pdu[0]) {
-            (3, 1..=7) => server.response(unit, pdu),
-            (_, 1..=7) => Framing::Rtu.frame(0, unit, &[pdu[0] | 0x80, 0x0B]),
-            _ => Framing::Rtu.frame(0, unit, &[pdu[0] | 0x80, 1]),
-        })
+    let line = line(|unit, pdu| match (unit, pdu[0]) {
+        (3, 1..=7) => Answer,
+        (_, 1..=7) => Exception(0x0B),
+        _ => Exception(1),
     });
     let text = At::tcp(line).run("scan --units 1-5").fine();
     assert!(

@@ -52,22 +52,6 @@ fn ctrl_c_reports_how_many_settings_are_written_and_that_nothing_is_saved() {
 }
 
 #[test]
-fn a_file_without_settings_or_in_utf_16_is_refused() {
-    let (unit, _) = unit(0xFFFF);
-    let (_folder, path) = file("");
-    let words = format!("config import {}", path.display());
-    let text = At::tcp(unit).run(&words).failed(2);
-    assert!(
-        text.contains("has no setting; nothing is written"),
-        "{text}"
-    );
-    std::fs::write(&path, b"\xFF\xFEB\0A\0U\0D\0").unwrap();
-    let text = At::tcp(unit).run(&words).failed(2);
-    assert!(text.contains("is UTF-16, as `>` of PowerShell"), "{text}");
-    assert!(text.contains("config export FILE"), "{text}");
-}
-
-#[test]
 fn change_of_a_module_needs_a_yes() {
     let (unit, words) = unit(0xFFFF);
     let (_folder, path) = file("p5.module = \"4di\"\nCOMM_TIMEOUT = 2.5\n");

@@ -10,7 +10,7 @@ use register_map::Module;
 use register_map::state::PRODUCT_CODE;
 
 use crate::served::{Answers, Modio, serve_requests};
-use crate::terminal::{Terminal, wait};
+use crate::terminal::Terminal;
 
 /// A unit that is served over TCP with RTU frames.
 struct Unit {
@@ -103,11 +103,7 @@ fn output_is_switched_by_key_and_by_click_and_a_silent_unit_is_shown() {
     terminal.wait_for("p5.3 digital input         ■ on  good");
 
     terminal.press("q");
-    assert!(terminal.wait_for_end().success());
-    wait(
-        || terminal.is_restored(),
-        || "the terminal is not restored".to_owned(),
-    );
+    terminal.wait_for_success();
 }
 
 #[test]
@@ -170,11 +166,7 @@ fn ctrl_c_restores_the_terminal_with_status_0() {
     let unit = Unit::serve();
     let mut terminal = monitor(&unit);
     terminal.press("\x03");
-    assert!(terminal.wait_for_end().success());
-    wait(
-        || terminal.is_restored(),
-        || "the terminal is not restored".to_owned(),
-    );
+    terminal.wait_for_success();
 }
 
 #[test]

@@ -34,6 +34,7 @@ fn export_with_a_port_whose_number_can_change_is_warned_of() {
         ("ttyACM3", "json", other, 1),
         ("by-path/usb-0:1.2", "telegraf", socket, 1),
         ("ttyUSB1", "csv", "warning", 0),
+        ("ttyUSB2", "node-red", other, 1),
         ("by-path/usb-0:1.3", "csv", "warning", 0),
         ("line", "telegraf", "warning", 0),
     ] {

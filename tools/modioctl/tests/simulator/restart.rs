@@ -15,17 +15,6 @@ use crate::program::At;
 use crate::served::{Answers, Modio, serve, serve_requests};
 use crate::unit::Unit;
 
-/// What a restart does.
-#[derive(Clone, Copy)]
-enum Restart {
-    /// The values of the registers are saved.
-    Saved,
-    /// They are not, and a restart loses them.
-    Unsaved,
-    /// They are saved, and the gateway does not follow.
-    Gateway,
-}
-
 /// Returns a modio whose MODE is ASCII, which is not saved.
 fn in_ascii_mode() -> Modio {
     let mut unit = Modio::modio_02(Module::Di4);
@@ -37,10 +26,11 @@ fn is_command(pdu: &[u8]) -> bool {
     pdu[0] == 6 && pdu[1..3] == COMMAND.to_be_bytes()
 }
 
-/// A unit over TCP in RTU mode whose registers announce ASCII mode.
-fn unit(mode: Restart) -> SocketAddr {
+/// A unit over TCP in RTU mode whose registers announce ASCII mode, which may be saved. After a restart nothing answers
+/// behind a gateway that does not follow.
+fn unit(is_saved: bool, gateway_follows: bool) -> SocketAddr {
     let mut modio = in_ascii_mode();
-    if !matches!(mode, Restart::Unsaved) {
+    if is_saved {
         modio.modio.saved.insert(MODE, 1);
     }
     let unit = Arc::new(Mutex::new((modio, Framing::Rtu)));
@@ -55,10 +45,9 @@ fn unit(mode: Restart) -> SocketAddr {
             let frame = framing.frame(0, address, &answer);
             master.write_all(&frame).unwrap();
             if is_command(&pdu) {
-                *framing = match (mode, modio.modio.edited[&MODE]) {
-                    // Nothing more is answered.
-                    (Restart::Gateway, _) => Framing::Mbap,
-                    (_, 0) => Framing::Rtu,
+                *framing = match modio.modio.edited[&MODE] {
+                    _ if !gateway_follows => Framing::Mbap,
+                    0 => Framing::Rtu,
                     _ => Framing::Ascii,
                 };
             }
@@ -68,15 +57,17 @@ fn unit(mode: Restart) -> SocketAddr {
 
 #[test]
 fn a_restart_is_followed_by_the_settings_with_which_the_unit_answers() {
-    for (mode, wanted) in [
-        (Restart::Saved, "now answers with ASCII"),
-        (Restart::Unsaved, "still answers with RTU"),
+    for (is_saved, wanted) in [
+        (true, "now answers with ASCII"),
+        (false, "still answers with RTU"),
     ] {
-        let text = At::tcp(unit(mode)).run("--timeout 200ms reboot").fine();
+        let text = At::tcp(unit(is_saved, true))
+            .run("--timeout 200ms reboot")
+            .fine();
         assert!(text.contains(wanted), "{text}");
         assert!(text.ends_with("restarted\n"), "{text}");
     }
-    let lost = At::tcp(unit(Restart::Gateway)).run("--timeout 200ms reboot");
+    let lost = At::tcp(unit(true, false)).run("--timeout 200ms reboot");
     let text = lost.failed(3);
     let both = "neither with the RTU that it had nor with the ASCII that it announced";
     assert!(text.contains(both) && text.contains("gateway"), "{text}");

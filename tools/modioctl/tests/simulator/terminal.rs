@@ -95,12 +95,17 @@ impl Terminal {
         }
     }
 
-    pub fn is_restored(&self) -> bool {
-        let parser = self.parser.lock().unwrap();
-        let screen = parser.screen();
-        !screen.alternate_screen()
-            && !screen.hide_cursor()
-            && screen.mouse_protocol_mode() == vt100::MouseProtocolMode::None
+    /// Waits for the end of the program with status 0, after which the terminal is as before.
+    pub fn wait_for_success(&mut self) {
+        assert!(self.wait_for_end().success());
+        let is_restored = || {
+            let parser = self.parser.lock().unwrap();
+            let screen = parser.screen();
+            !screen.alternate_screen()
+                && !screen.hide_cursor()
+                && screen.mouse_protocol_mode() == vt100::MouseProtocolMode::None
+        };
+        wait(is_restored, || "the terminal is not restored".to_owned());
     }
 }
 
@@ -118,7 +123,7 @@ fn parser() -> vt100::Parser {
 }
 
 /// Waits until `done` returns true, and fails with this text when it never does.
-pub fn wait(mut done: impl FnMut() -> bool, what: impl Fn() -> String) {
+fn wait(mut done: impl FnMut() -> bool, what: impl Fn() -> String) {
     let until = Instant::now() + PATIENCE;
     while !done() {
         assert!(Instant::now() < until, "{}", what());

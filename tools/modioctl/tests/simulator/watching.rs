@@ -1,9 +1,11 @@
-//! Tests of `modioctl watch` with a unit that this test serves, and that is switched off for a time.
+//! Tests of `modioctl watch` with units that this test serves.
 
 use std::net::SocketAddr;
 
-use crate::program::At;
-use crate::served::{Answers, other, serve_requests};
+use register_map::Module;
+
+use crate::program::{At, has};
+use crate::served::{Answers, Modio, other, serve_requests, serve_unit};
 
 /// Serves a unit that is no modio. Register 7 is the number of its reads. The reads with the numbers 2 and 3 have no
 /// answer; with `hangs_up` the connection is closed instead.
@@ -25,8 +27,21 @@ fn unit(hangs_up: bool) -> SocketAddr {
 /// Runs a command, and returns its lines without the header.
 fn lines(unit: SocketAddr, words: &str) -> Vec<String> {
     let words = format!("--timeout 50ms --retries 0 watch 7 8 --every 100ms --count 2 {words}");
-    let text = At::tcp(unit).run(&words).fine();
-    text.lines().map(str::to_owned).collect()
+    let ran = At::tcp(unit).run(&words);
+    has(&ran.err, &["; waiting for it\n", "the unit is back\n"]);
+    ran.fine().lines().map(str::to_owned).collect()
+}
+
+#[test]
+fn values_have_their_names_and_without_names_they_are_those_of_all_points() {
+    let at = At::tcp(serve_unit(Modio::modio_02(Module::Di4)));
+    let text = at.run("watch --count 3 --every 50ms").fine();
+    assert_eq!(text.matches("p5.4 off").count(), 3, "{text}");
+    let text = at
+        .run("watch p5.1 status --count 2 --every 50ms --csv")
+        .fine();
+    assert_eq!(text.lines().next(), Some("time,p5.1,status"));
+    assert_eq!(text.matches(",off,-").count(), 2, "{text}");
 }
 
 #[test]
