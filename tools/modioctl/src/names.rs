@@ -530,14 +530,6 @@ mod tests {
     }
 
     #[test]
-    fn a_board_with_more_slots_has_their_points() {
-        let book = super::book(&MODIO_08, Module::Do4, (0, 0));
-        assert_eq!(book.points().count(), 16);
-        assert_eq!(book.find("p4.4").unwrap().address, 15);
-        assert!(book.find("p5.1").is_err());
-    }
-
-    #[test]
     fn register_at_the_end_of_the_addresses_is_found() {
         let mut description = describe(&MODIO_02, "0.1.0", |_| Module::None);
         let counter = description

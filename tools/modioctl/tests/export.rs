@@ -31,13 +31,10 @@ fn modbus_tcp() -> Endpoint {
     Endpoint::new(Place::ModbusTcp("[::1]:502".to_owned()), Framing::Mbap)
 }
 
-/// RANGE and SCALE of an NTC, 4-20 mA, 0-10 V and 4-20 mA in engineering units.
-const READINGS: [(u16, u16); 4] = [(2, 1), (1, 1), (0, 1), (1, 1)];
-
 /// A modio-02 with module 2ai2ao in engineering units: NTC, 4-20 mA, 0-10 V and 4-20 mA.
 fn analog() -> Book {
     let mut readings = vec![(0, 0); 32];
-    readings[0x10..0x14].copy_from_slice(&READINGS);
+    readings[0x10..0x14].copy_from_slice(&[(2, 1), (1, 1), (0, 1), (1, 1)]);
     Book::new(describe(&MODIO_02, "0.1.0", |_| Module::Ai2Ao2), readings)
 }
 
@@ -47,14 +44,15 @@ fn digital() -> Book {
     Book::new(describe(&MODIO_08, "0.1.0", module), vec![(0, 0); 32])
 }
 
-/// The first two ports of a modio-08: relays, and an NTC, 4-20 mA, 0-10 V and 4-20 mA. A link holds the coil of relay 1: it
-/// is a sensor that nothing writes.
+/// The first two ports of a modio-08: relays, and three points, an NTC, 0-10 V and an output with 4-20 mA. A link holds the
+/// coil of relay 1: it is a sensor that nothing writes.
 fn mixed() -> Source {
     let module = |port| [Module::Relay2, Module::Ai2Ao2][usize::from(port > 1)];
     let mut description = describe(&MODIO_08, "0.1.0", module);
     description.ports.truncate(2);
+    description.ports[1].lacks = 1;
     let mut readings = vec![(0, 0); 32];
-    readings[4..8].copy_from_slice(&READINGS);
+    readings[4..7].copy_from_slice(&[(2, 1), (0, 1), (1, 1)]);
     let held = [("p1.3".to_owned(), vec!["p2.1".to_owned()])];
     Source {
         held: held.into(),
@@ -308,6 +306,8 @@ fn units_of_a_line_share_one_hub_client_and_input() {
     assert_eq!(inputs[4]["name"], "Hall 2 modio-02 3 p5.1");
     assert_eq!(inputs[4]["unique_id"], "hall_2_modio_02_3_p5_1");
     let number = &yaml["template"][0]["number"][0];
+    let written = &number["set_value"][0]["data"]["value"];
+    assert_eq!(written, "{{ value | round | int }}");
     assert_eq!(number["set_value"][0]["data"]["hub"], "hall_2");
     let state = "{{ states('sensor.hall_2_modio_02_1_p5_3') }}";
     assert_eq!(number["state"], state);

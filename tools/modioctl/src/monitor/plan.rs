@@ -2,24 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use register_map::state::{BUS_MESSAGES, T15_GAPS};
+
 use crate::links;
 use crate::names::{Book, Item, Meaning, PortItems, port_of};
 
 /// Values by the name of their item.
 pub type Words = BTreeMap<String, Vec<u16>>;
-
-/// Counters of the line, by their names in the description.
-const COUNTERS: [&str; 9] = [
-    "bus messages",
-    "bus communication errors",
-    "exceptions sent",
-    "messages for this unit",
-    "no response",
-    "NAK",
-    "busy",
-    "character overruns",
-    "inter-character gaps",
-];
 
 /// The items to read of a unit.
 #[derive(Clone, Debug, Default)]
@@ -61,7 +50,8 @@ impl Plan {
                 }
             }
         }
-        let counters = COUNTERS.iter().filter_map(|name| found(name));
+        let is_counter = |item: &&Item| (BUS_MESSAGES..=T15_GAPS).contains(&item.address);
+        let counters = book.items().iter().filter(is_counter).cloned();
         Self {
             counters: counters.collect(),
             links: links::all(book).unwrap_or_default(),
@@ -176,7 +166,7 @@ mod tests {
         assert!(has(&plan.state, "uptime") && has(&plan.state, "p5.4.channel_status"));
         assert!(has(&plan.state, "p5.module_state") && has(&plan.state, "p5.module_in_force"));
         assert!(has(&plan.settings, "p5.1.range") && has(&plan.settings, "p5.4.scale"));
-        assert_eq!(plan.counters.len(), COUNTERS.len());
+        assert_eq!(plan.counters.len(), 9);
     }
 
     #[test]

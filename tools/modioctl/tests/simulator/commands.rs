@@ -1,22 +1,23 @@
 //! Tests of every command, except `monitor` and `sniff`, which have their own files. Reads, writes and scans run on each
 //! kind of line, the other commands on one of them.
 
+use crate::bus;
+use crate::gateway::Gateway;
 use crate::program::{At, has, modioctl};
 use crate::unit::Unit;
-use crate::{bus, gateway};
 
 fn lines(unit: &Unit) -> [At; 3] {
     [
         At::port(unit.pty.display()),
         At::tcp(unit.tcp),
-        At::modbus_tcp(gateway::before(unit.tcp)),
+        At::modbus_tcp(Gateway::default().before(unit.tcp)),
     ]
 }
 
 #[test]
 #[ignore = "needs the simulator: cargo xtask test"]
 fn a_slot_is_commissioned_with_one_command_and_its_points_are_read() {
-    let unit = Unit::start(1, "4ai");
+    let unit = Unit::with(1, &["--module", "4ai", "--no-preset"]);
     let [at, ..] = lines(&unit);
     let text = at.run("module set p5 4ai").fine();
     assert_eq!(text, "port 5: 4ai, saved and in force; state: good\n");
@@ -59,22 +60,24 @@ fn info_and_describe_show_identity_and_registers() {
     let unit = Unit::with(7, &["--module", "2relay"]);
     let [_, at, _] = lines(&unit);
     let text = at.run("--unit 7 info").fine();
-    for part in [
-        "LLD-ModbusIO-02",
-        "modio-02",
-        "2relay",
-        "reset cause",
-        "bus messages",
-    ] {
-        assert!(text.contains(part), "{part}: {text}");
-    }
+    has(
+        &text,
+        &[
+            "LLD-ModbusIO-02",
+            "modio-02",
+            "2relay",
+            "reset cause",
+            "bus messages",
+        ],
+    );
     let info: serde_json::Value =
         serde_json::from_str(&at.run("--unit 7 --json info").fine()).unwrap();
     assert_eq!(info["unit address"], 7);
     let text = at.run("--unit 7 describe").fine();
-    for part in ["p5.3 ", "digital output", "BAUD", "COMM_TIMEOUT", "0x0010"] {
-        assert!(text.contains(part), "{part}: {text}");
-    }
+    has(
+        &text,
+        &["p5.3 ", "digital output", "BAUD", "COMM_TIMEOUT", "0x0010"],
+    );
     // The description read from the unit is the same, except for the source.
     let read = at.run("--unit 7 describe --refresh").fine();
     assert!(

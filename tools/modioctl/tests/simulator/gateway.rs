@@ -33,11 +33,6 @@ impl Default for Gateway {
     }
 }
 
-/// Starts a usual gateway to the line at `line` and returns the gateway's address.
-pub fn before(line: SocketAddr) -> SocketAddr {
-    Gateway::default().before(line)
-}
-
 impl Gateway {
     /// A usual gateway that waits this time for a unit.
     pub fn waiting(wait: Duration) -> Self {

@@ -191,9 +191,7 @@ fn an_answer_that_is_a_second_late_belongs_to_its_own_unit_and_is_not_a_second_u
 fn a_scan_that_finds_nothing_names_the_response_delay_and_the_radio() {
     let (bus, _) = bus(BTreeSet::new(), Duration::ZERO);
     let text = At::tcp(bus).run("scan --units 1-2").failed(3);
-    for part in ["RESPONSE_DELAY", "over the air", "--timeout"] {
-        assert!(text.contains(part), "{text}");
-    }
+    has(&text, &["RESPONSE_DELAY", "over the air", "--timeout"]);
 }
 
 #[test]

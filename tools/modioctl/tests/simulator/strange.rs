@@ -114,6 +114,12 @@ fn raw_shows_exceptions_of_gateways_and_names_busy() {
             3,
         ),
         (&[0x83, 6], "<- 01 83 06", "busy", 1),
+        (
+            &[0x83, 2],
+            "<- 01 83 02",
+            "exception 02 (illegal data address): there is no such point",
+            1,
+        ),
     ] {
         let at = At::tcp(gateway(move |_| Framing::Rtu.frame(0, 1, answer)));
         let ran = at.run(&format!("{WORDS} raw 03 0010 0001"));

@@ -32,12 +32,7 @@ pub fn update_file() -> PathBuf {
 }
 
 impl Unit {
-    /// Starts a modio-02 with this address and this module in its slot; nothing is stored yet.
-    pub fn start(address: u8, module: &str) -> Self {
-        Self::with(address, &["--module", module, "--no-preset"])
-    }
-
-    /// Starts a modio-02 with these options of the simulator.
+    /// Starts a modio-02 with this address and these options of the simulator.
     pub fn with(address: u8, options: &[&str]) -> Self {
         Self::run(&[&["--dip", &address.to_string()], options].concat())
     }

@@ -46,11 +46,7 @@ impl Line {
         Self::with(count, change, false, usize::MAX)
     }
 
-    /// The same, with an adapter that may return what it sends.
-    fn with_echo(count: u8, change: impl FnMut(&mut Model), echo: bool) -> Self {
-        Self::with(count, change, echo, usize::MAX)
-    }
-
+    /// The same, with an adapter that may return what it sends. The connection is lost after `cut` writes.
     fn with(count: u8, change: impl FnMut(&mut Model), echo: bool, cut: usize) -> Self {
         let fault = [
             (fault::KIND, FaultKind::Panic.code()),
@@ -178,14 +174,16 @@ fn units_are_updated_together_and_again_only_when_it_is_forced() {
 
 #[test]
 fn blocks_are_broadcast_unless_something_answers_and_an_echo_is_no_answer() {
-    let answers = |unit: &mut Model| unit.flaw = Flaw::AnswersBroadcasts;
-    for (line, alone) in [
-        (Line::with_echo(2, |_| (), true), false),
-        (Line::new(2, answers), true),
-    ] {
-        let text = line.run("update FILE --units 1-2").fine();
+    for is_echo in [true, false] {
+        let answers = |unit: &mut Model| {
+            if !is_echo {
+                unit.flaw = Flaw::AnswersBroadcasts;
+            }
+        };
+        let text = Line::with(2, answers, is_echo, usize::MAX);
+        let text = text.run("update FILE --units 1-2").fine();
         has(&text, &["unit 1: 0.1.2", "unit 2: 0.1.2"]);
-        assert_eq!(text.contains("to each unit alone"), alone, "{text}");
+        assert_eq!(text.contains("to each unit alone"), !is_echo, "{text}");
     }
 }
 
