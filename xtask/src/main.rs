@@ -165,8 +165,9 @@ fn run(cli: Cli) -> Result<()> {
             // This program has all options and does everything, including writing the image, for which it calls `cargo
             // xtask flash`. It replaces this process, so that it receives Ctrl-C and SIGTERM, restores the board, and
             // sets the exit status.
-            let program = workspace.program("modio-hil")?;
-            command::exec(std::process::Command::new(program).args(arguments))
+            let program = workspace.program("modio-conformance")?;
+            let mut program = std::process::Command::new(program);
+            command::exec(program.arg("hil").args(arguments))
         }
         Command::Peers(options) => peers::run(workspace, &options),
         Command::Fuzz(options) => fuzz::run(workspace, &options),

@@ -125,7 +125,7 @@ pub const ALL: [&str; 2] = ["--workspace", "--ignore-rust-version"];
 
 /// The feature with which the conformance suite contains the simulator. All tests are built with it, so that nothing is
 /// built twice.
-pub const SUITE: &str = "hil/sim";
+pub const SUITE: &str = "conformance/sim";
 
 /// Runs a build of cargo, which shows its progress, and returns its products.
 pub fn artifacts(cargo: &mut Command) -> Result<Vec<Artifact>> {

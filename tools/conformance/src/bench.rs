@@ -1,9 +1,12 @@
 //! The tools of a case: the endpoint, what is known about the unit, and steps that send requests and check replies.
 
 use std::fmt::Display;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use crate::check::{Check, Failure, Stop};
+use serde_json::Value;
+
+use crate::check::{Check, Failure, Part, Stop, skip};
 use crate::endpoint::{Broken, Endpoint, Piece, Received, shown};
 use crate::frame::{Reply, hex};
 use crate::target::{Patience, Target};
@@ -31,7 +34,12 @@ pub struct Bench<'a> {
     pub sent_end: Duration,
     /// The characters of the last reply.
     pub received: Vec<Received>,
+    /// Set when the user ends the run. A case that takes long ends early then.
+    pub stop: &'a AtomicBool,
 }
+
+/// What [`Bench::stop`] is when nobody can end the run.
+static NEVER: AtomicBool = AtomicBool::new(false);
 
 impl<'a> Bench<'a> {
     /// Returns the tools for this line and unit.
@@ -45,7 +53,38 @@ impl<'a> Bench<'a> {
             came: String::new(),
             sent_end: Duration::ZERO,
             received: Vec::new(),
+            stop: &NEVER,
         }
+    }
+
+    /// Skips the rest of the case when the user ends the run.
+    pub fn go_on(&self) -> Check {
+        if self.stop.load(Ordering::Relaxed) {
+            return skip("interrupted");
+        }
+        Ok(())
+    }
+
+    /// Carries out a part of a case. A mistake of the unit is the result of the part; anything else ends the case.
+    pub fn part(
+        &mut self,
+        name: String,
+        test: impl FnOnce(&mut Self, &mut Part) -> Check,
+    ) -> Check<Part> {
+        let begin = self.endpoint.now();
+        let mut part = Part {
+            name,
+            note: String::new(),
+            measured: Value::Null,
+            result: Ok(()),
+            time: Duration::ZERO,
+        };
+        match test(self, &mut part) {
+            Err(Stop::Fail(failure)) => part.result = Err(failure),
+            other => other?,
+        }
+        part.time = self.endpoint.now().saturating_sub(begin);
+        Ok(part)
     }
 
     /// Returns the unit's address.

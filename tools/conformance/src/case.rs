@@ -2,7 +2,7 @@
 
 use crate::bench::Bench;
 
-pub use crate::check::{Check, Failure, Stop, skip};
+pub use crate::check::{Check, Failure, Part, Stop, skip};
 
 /// Something without which a case is skipped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,6 +43,14 @@ pub enum Need {
     Rtu,
     /// The unit speaks ASCII.
     Ascii,
+    /// The user asks for requests at each rate (`--requests`).
+    Requests,
+    /// The bench file has digital wires.
+    Wires,
+    /// The bench file has digital wires whose pulses are counted.
+    Pulses,
+    /// The bench file has analog wires.
+    AnalogWires,
 }
 
 /// Where the demand of a case comes from.
@@ -71,7 +79,7 @@ impl Kind {
 }
 
 /// A named case.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Case {
     /// The name: a group, a slash, and what is tried. Each name is used once.
     pub name: &'static str,
@@ -84,7 +92,16 @@ pub struct Case {
     /// What the case needs of the unit and the endpoint.
     pub needs: &'static [Need],
     /// Runs the case.
-    pub run: fn(&mut Bench<'_>) -> Check,
+    pub run: Run,
+}
+
+/// The function that runs a case.
+#[derive(Clone, Copy, Debug)]
+pub enum Run {
+    /// The case has one verdict.
+    Whole(fn(&mut Bench<'_>) -> Check),
+    /// There is a verdict for each part of the case, such as a wire or a rate. The function calls the closure with each part.
+    Parts(fn(&mut Bench<'_>, &mut dyn FnMut(Part)) -> Check),
 }
 
 impl Case {
@@ -95,14 +112,36 @@ impl Case {
     }
 }
 
-/// Returns a case. Its kind is [`Kind::Modio`] when it needs a modio or cites the register map, [`Kind::Extension`] when
-/// it cites Fast Modbus, and [`Kind::Standard`] otherwise.
+/// Returns a case with one verdict.
 pub const fn case(
     name: &'static str,
     section: &'static str,
     about: &'static str,
     needs: &'static [Need],
     run: fn(&mut Bench<'_>) -> Check,
+) -> Case {
+    new(name, section, about, needs, Run::Whole(run))
+}
+
+/// Returns a case whose parts have verdicts.
+pub const fn parts(
+    name: &'static str,
+    section: &'static str,
+    about: &'static str,
+    needs: &'static [Need],
+    run: fn(&mut Bench<'_>, &mut dyn FnMut(Part)) -> Check,
+) -> Case {
+    new(name, section, about, needs, Run::Parts(run))
+}
+
+/// The kind of a case is [`Kind::Modio`] when it needs a modio or cites the register map, [`Kind::Extension`] when
+/// it cites Fast Modbus, and [`Kind::Standard`] otherwise.
+const fn new(
+    name: &'static str,
+    section: &'static str,
+    about: &'static str,
+    needs: &'static [Need],
+    run: Run,
 ) -> Case {
     let source = section.as_bytes();
     let mut modio = matches!(source, [b'm', b'a', b'p', ..]);

@@ -1,4 +1,8 @@
-//! The result of a step of a case.
+//! The result of a step, or a part, of a case.
+
+use std::time::Duration;
+
+use serde_json::Value;
 
 use crate::endpoint::Broken;
 
@@ -37,4 +41,19 @@ pub type Check<T = ()> = Result<T, Stop>;
 /// [`Stop::Skip`] always.
 pub fn skip<T>(why: impl Into<String>) -> Check<T> {
     Err(Stop::Skip(why.into()))
+}
+
+/// The result of a part of a case.
+#[derive(Clone, Debug)]
+pub struct Part {
+    /// What was tested, such as a wire.
+    pub name: String,
+    /// What was measured, for people; it may have several lines.
+    pub note: String,
+    /// What was measured, for programs.
+    pub measured: Value,
+    /// The mistake of the unit, if it made one.
+    pub result: Result<(), Failure>,
+    /// How long it took by the endpoint's clock.
+    pub time: Duration,
 }

@@ -3,28 +3,37 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use anyhow::{Context as _, Result, bail, ensure};
+use anyhow::{Context as _, Result, anyhow, bail, ensure};
 use clap::Parser;
 use modbus_line::{Format, LineFormat};
+use register_map::Module;
 
 use crate::case::{Case, Kind};
+use crate::cases;
 use crate::endpoint::Endpoint;
 use crate::endpoint::exact_line;
 use crate::endpoint::stream::Stream;
 use crate::frame::Mode;
+use crate::hil::Hil;
+use crate::hil::bench_file::BenchFile;
+use crate::hil::options::Options;
 use crate::profile::Profile;
-use crate::program::Files;
+use crate::report::files::Files;
 use crate::target::Patience;
 
 /// Tests a Modbus serial-line server from outside, case by case, each with the section it comes from.
 ///
-/// Leaves the unit as it was. Exit status: 0 all cases passed or were skipped, 1 some failed, 2 nothing
-/// could be tested.
+/// Leaves the unit as it was, also after Ctrl-C. Exit status: 0 all cases passed or were skipped, 1 some failed, 2 nothing
+/// could be tested, 130 interrupted.
 #[derive(Clone, Debug, Parser)]
 #[command(name = "modio-conformance")]
 pub struct Cli {
+    /// Test a modio on a bench (docs/hil.md): measure, too, how soon and how reliably it answers
+    #[arg(value_parser = ["hil"])]
+    pub hil: Option<String>,
+
     /// Test through this serial port or pseudo-terminal
-    #[arg(long, value_name = "PORT", group = "endpoint")]
+    #[arg(long, visible_alias = "port", value_name = "PORT", group = "endpoint")]
     pub serial: Option<PathBuf>,
 
     /// Test through raw bytes over TCP: the simulator's --tcp, Renode's socket, a serial device server
@@ -53,11 +62,9 @@ pub struct Cli {
     #[arg(long, value_name = "NAME", default_value_t = &register_map::board::MODIO_02, conflicts_with_all = ["serial", "tcp", "exact_line"])]
     pub board: &'static register_map::Board,
 
-    /// The module in the simulated board's first slot
-    #[cfg(feature = "sim")]
-    #[arg(help = format!("The module in the simulated board's first slot: {}", register_map::Module::ALL.map(register_map::Module::name).join(", ")))]
-    #[arg(long, value_name = "NAME", default_value = "4do", conflicts_with_all = ["serial", "tcp", "exact_line"])]
-    pub module: register_map::Module,
+    /// The module in the first slot: that of the simulated board [default: 4do], or that which a real board must have
+    #[arg(long, value_name = "NAME")]
+    pub module: Option<Module>,
 
     /// The module in the simulated board's slot at a port, such as 3=4ai; may be repeated
     #[cfg(feature = "sim")]
@@ -74,13 +81,13 @@ pub struct Cli {
     #[arg(long, value_name = "REGISTER=VALUE", value_parser = setting, conflicts_with_all = ["serial", "tcp", "exact_line"])]
     pub set: Vec<(u16, u16)>,
 
-    /// The line's rate in bit/s
-    #[arg(long, value_name = "RATE", default_value_t = 9600, value_parser = clap::value_parser!(u32).range(modbus_line::RATES))]
-    pub baud: u32,
+    /// The line's rate in bit/s [default: 9600]
+    #[arg(long, value_name = "RATE", value_parser = clap::value_parser!(u32).range(modbus_line::RATES))]
+    pub baud: Option<u32>,
 
-    /// The line's format: data bits, parity, stop bits
-    #[arg(long, value_name = "FORMAT", default_value = "8N2")]
-    pub format: Format,
+    /// The line's format: data bits, parity, stop bits [default: 8N2]
+    #[arg(long, value_name = "FORMAT")]
+    pub format: Option<Format>,
 
     /// The unit's address [default: the profile's, the DIP switch, or 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..))]
@@ -130,6 +137,10 @@ pub struct Cli {
     /// Files for the results
     #[command(flatten)]
     pub reports: Files,
+
+    /// The options about a bench
+    #[command(flatten, next_help_heading = "A modio on a bench")]
+    pub on_bench: Options,
 }
 
 #[cfg(feature = "sim")]
@@ -141,18 +152,74 @@ fn setting(text: &str) -> Result<(u16, u16), String> {
 }
 
 impl Cli {
+    /// Reads the bench file, if one is named, and takes from it what the options do not say.
+    pub fn with_bench_file(mut self) -> Result<Self> {
+        if let Some(path) = &self.on_bench.bench {
+            let shown = path.display();
+            let text = std::fs::read_to_string(path).with_context(|| shown.to_string())?;
+            let file =
+                BenchFile::parse(&text, self.unit).map_err(|wrong| anyhow!("{shown}:{wrong}"))?;
+            if !self.names_endpoint() {
+                self.serial = file.port;
+            }
+            self.unit = self.unit.or(file.unit);
+            self.baud = self.baud.or(file.baud);
+            self.format = self.format.or(file.format);
+            self.module = self.module.or(file.module);
+            let bench = &mut self.on_bench;
+            bench.probe = bench.probe.take().or(file.probe);
+            bench.reset_cmd = bench.reset_cmd.take().or(file.reset_cmd);
+            bench.power_cmd = bench.power_cmd.take().or(file.power_cmd);
+            bench.wires = file.wires;
+        }
+        let hil = self.of_bench();
+        ensure!(
+            !self.on_bench.no_suite || hil.requests > 0 || !hil.wires.is_empty(),
+            "nothing to test: no suite, no requests, and no wires in a bench file"
+        );
+        Ok(self)
+    }
+
+    fn names_endpoint(&self) -> bool {
+        let named = self.serial.is_some() || self.tcp.is_some() || self.exact_line.is_some();
+        #[cfg(feature = "sim")]
+        let named = named || self.sim.is_some();
+        named
+    }
+
+    /// Returns what a bench adds to the cases.
+    pub fn of_bench(&self) -> Hil {
+        let usual = if self.hil.is_some() { 2000 } else { 0 };
+        self.on_bench.adds(usual)
+    }
+
+    /// Returns the options with which modioctl reaches the unit.
+    pub fn reached(&self) -> Result<Vec<String>> {
+        let (option, place) = match (&self.serial, &self.tcp) {
+            (Some(port), _) => ("--port", port.display().to_string()),
+            (None, Some(address)) => ("--tcp", address.clone()),
+            (None, None) => bail!("--update needs a serial port or --tcp"),
+        };
+        let (line, unit) = (self.line(), self.unit(None).to_string());
+        let (baud, format) = (line.baud.to_string(), line.format.to_string());
+        let options = [option, &place, "--baud", &baud, "--format", &format];
+        let options = options.into_iter().chain(["--unit", &unit]);
+        Ok(options.map(str::to_owned).collect())
+    }
+
     /// Returns the line's rate and format.
     pub fn line(&self) -> LineFormat {
-        LineFormat::new(self.baud, self.format)
+        let usual = LineFormat::default();
+        let format = self.format.unwrap_or(usual.format);
+        LineFormat::new(self.baud.unwrap_or(usual.baud), format)
     }
 
     /// Returns the transmission mode, by the option or the profile.
-    pub fn mode(&self, profile: Option<&Profile>) -> Result<Mode> {
+    pub fn mode(&self, profile: Option<&Profile>) -> Mode {
         if self.ascii {
-            return Ok(Mode::Ascii);
+            return Mode::Ascii;
         }
-        let mode = profile.map(Profile::mode).transpose()?.flatten();
-        Ok(mode.unwrap_or_default())
+        profile.and_then(|profile| profile.mode).unwrap_or_default()
     }
 
     /// Returns the unit's address.
@@ -179,14 +246,16 @@ impl Cli {
     /// Opens the endpoint.
     pub fn open(&self, mode: Mode) -> Result<Box<dyn Endpoint>> {
         ensure!(
-            self.format.data_bits != 7 || mode == Mode::Ascii,
+            self.line().format.data_bits != 7 || mode == Mode::Ascii,
             "RTU needs 8 data bits: give another --format, or --ascii"
         );
         if let Some(path) = &self.serial {
-            return Ok(Box::new(Stream::serial(path, self.line())?));
+            let stream = Stream::serial(path, self.line())?;
+            return Ok(Box::new(stream.with_power(self.on_bench.power_cmd.clone())));
         }
         if let Some(address) = &self.tcp {
-            return Ok(Box::new(Stream::tcp(address, self.line())?));
+            let stream = Stream::tcp(address, self.line())?;
+            return Ok(Box::new(stream.with_power(self.on_bench.power_cmd.clone())));
         }
         if let Some(address) = &self.exact_line {
             return Ok(Box::new(exact_line::Tcp::connect(address)?));
@@ -198,7 +267,7 @@ impl Cli {
                 elf: elf.clone(),
                 image: self.image.clone(),
                 board: self.board,
-                module: self.module,
+                module: self.module.unwrap_or(Module::Do4),
                 slots: self.slots.clone(),
                 dip: self.dip,
                 line: self.line(),
@@ -223,10 +292,18 @@ impl Cli {
 
     /// Returns the cases to run.
     pub fn cases(&self) -> Result<Vec<Case>> {
-        let mut cases = chosen(&self.only)?;
+        let mut cases = cases::of_bench();
+        if !self.on_bench.no_suite {
+            cases.splice(0..0, cases::all());
+        }
+        let has = |parts: &[String], case: &Case| parts.iter().any(|part| case.name.contains(part));
+        cases.retain(|case| self.only.is_empty() || has(&self.only, case));
+        ensure!(
+            !cases.is_empty(),
+            "no case has such a name: modio-conformance --list shows them"
+        );
         cases.retain(|case| {
-            let excluded = self.exclude.iter().any(|part| case.name.contains(part));
-            !excluded && (!self.standard_only || case.kind == Kind::Standard)
+            !has(&self.exclude, case) && (!self.standard_only || case.kind == Kind::Standard)
         });
         ensure!(
             !cases.is_empty(),
@@ -234,19 +311,6 @@ impl Cli {
         );
         Ok(cases)
     }
-}
-
-/// Returns the cases whose names contain one of these parts; all when there is none.
-pub fn chosen(parts: &[String]) -> Result<Vec<Case>> {
-    let mut cases = crate::cases::all();
-    if !parts.is_empty() {
-        cases.retain(|case| parts.iter().any(|part| case.name.contains(part)));
-    }
-    ensure!(
-        !cases.is_empty(),
-        "no case has such a name: modio-conformance --list shows them"
-    );
-    Ok(cases)
 }
 
 /// Returns the waiting times on an endpoint. Where time is exact, the line sets them. Elsewhere they allow for a slow
@@ -274,53 +338,4 @@ pub fn waits(endpoint: &dyn Endpoint, reply: Option<Duration>) -> Patience {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use clap::CommandFactory;
-
-    fn parse(arguments: &str) -> Cli {
-        Cli::try_parse_from(format!("x {arguments}").split_whitespace()).unwrap()
-    }
-
-    #[test]
-    fn the_options_are_consistent() {
-        Cli::command().debug_assert();
-        assert!(Cli::try_parse_from(["x", "--serial", "a", "--tcp", "b"]).is_err());
-        assert!(Cli::try_parse_from(["x", "--format", "8X1"]).is_err());
-        assert!(Cli::try_parse_from(["x", "--unit", "0"]).is_err());
-    }
-
-    #[test]
-    fn missing_endpoint_is_an_error_that_names_the_options() {
-        let text = parse("").open(Mode::Rtu).err().unwrap().to_string();
-        let both = text.contains("--serial") && text.contains("--tcp");
-        assert!(both, "{text}");
-        let wrong = parse("--format 7E1").open(Mode::Rtu).err().unwrap();
-        assert!(wrong.to_string().contains("--ascii"), "{wrong}");
-    }
-
-    #[test]
-    fn cases_are_chosen_by_parts_of_their_names() {
-        let all = parse("").cases().unwrap().len();
-        let some = parse("--only fc05/ --only ascii/").cases().unwrap();
-        assert!(some.len() > 10 && some.len() < all);
-        assert!(parse("--only no-such-case").cases().is_err());
-        let fewer = parse("--only fc05/ --exclude length --exclude value");
-        let names: Vec<_> = fewer.cases().unwrap().iter().map(|c| c.name).collect();
-        assert_eq!(names, ["fc05/on-and-off", "fc05/address"]);
-        assert!(parse("--exclude /").cases().is_err());
-        let standard = parse("--standard-only --only fc05/ --only config/");
-        let names: Vec<_> = standard.cases().unwrap().iter().map(|c| c.name).collect();
-        assert!(names.contains(&"fc05/value") && !names.contains(&"fc05/length"));
-        assert!(names.iter().all(|name| name.starts_with("fc05/")));
-    }
-
-    #[test]
-    fn unit_is_that_of_the_option_then_of_the_profile_then_1() {
-        assert_eq!(parse("").unit(None), 1);
-        assert_eq!(parse("--unit 9").unit(None), 9);
-        let profile = Profile::parse("unit = 17").unwrap();
-        assert_eq!(parse("").unit(Some(&profile)), 17);
-        assert_eq!(parse("--unit 9").unit(Some(&profile)), 9);
-    }
-}
+mod tests;

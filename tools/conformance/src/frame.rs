@@ -5,9 +5,11 @@ use std::fmt;
 
 use modbus_line::adu::{Framing, bytes};
 pub use modbus_line::adu::{crc, lrc};
+use serde::Deserialize;
 
 /// The form of a frame on the line.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Mode {
     /// Bytes, ended by silence.
     #[default]

@@ -6,18 +6,19 @@
 //! something is missing, the case is skipped with the reason.
 //!
 //! ```text
-//! main, cli,     the command                  case, cases/   the cases
-//! program
+//! main, cli      the command                  case, cases/   the cases
 //! probe, profile the unit under test: Target  bench, points  steps of cases: requests and checks
 //! endpoint/      the lines                    run, report/   runs cases; table, JUnit, JSON
 //! frame          RTU and ASCII frames         vectors        worked frames of manuals
-//!                                             interrupt      Ctrl-C
+//! hil/           a bench with a board         interrupt      Ctrl-C
+//!                                             about          unit, adapter, host and date of a run
 //! ```
 //!
 //! The suite shares no code with the server that it tests.
 
 #![forbid(unsafe_code)]
 
+pub mod about;
 pub mod bench;
 pub mod case;
 pub mod cases;
@@ -25,11 +26,11 @@ pub mod check;
 pub mod cli;
 pub mod endpoint;
 pub mod frame;
+pub mod hil;
 pub mod interrupt;
 pub mod points;
 pub mod probe;
 pub mod profile;
-pub mod program;
 pub mod rate;
 pub mod report;
 pub mod run;

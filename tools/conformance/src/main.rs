@@ -1,32 +1,78 @@
 //! `modio-conformance`: runs the suite against a unit and reports the results.
 
-use std::io;
+use std::fmt::Display;
+use std::io::{self, Write as _};
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 
+use anyhow::{anyhow, ensure};
+use clap::{CommandFactory as _, FromArgMatches as _};
+
+use conformance::about::{About, Unit};
+use conformance::bench::Bench;
+use conformance::cases::each_rate;
 use conformance::cli::Cli;
 use conformance::endpoint::trace::Trace;
+use conformance::hil::shell;
+use conformance::interrupt;
 use conformance::probe::{Given, probe};
-use conformance::report::{Totals, json, junit, table};
-use conformance::run;
+use conformance::report::{Report, Totals, json, junit, table};
+use conformance::run::run_until;
 use conformance::target::{Support, Target};
-use conformance::{interrupt, program};
 
 fn main() -> ExitCode {
-    program::run("modio-conformance", register_map::version!(), test)
+    let arguments = Cli::command()
+        .version(register_map::version!())
+        .try_get_matches();
+    let tested = match arguments.and_then(|found| Cli::from_arg_matches(&found)) {
+        Ok(cli) => test(cli),
+        Err(error) if error.use_stderr() => Err(anyhow!(one_line(&error))),
+        Err(help) => help.exit(),
+    };
+    match tested {
+        Ok(status) => ExitCode::from(status),
+        Err(error) => {
+            eprintln!("modio-conformance: {error:#}");
+            ExitCode::from(2)
+        }
+    }
 }
 
-/// Tests the unit, and returns the exit status.
-fn test(cli: &Cli) -> anyhow::Result<u8> {
+/// Prints one or more lines. A reader that has closed the pipe, as `head` does, is no error: the unit must still be
+/// restored, and the reports written.
+fn say(text: impl Display) {
+    let _ = writeln!(io::stdout(), "{text}");
+}
+
+fn one_line(error: &clap::Error) -> String {
+    let text = error.render().to_string();
+    let lines: Vec<&str> = text
+        .lines()
+        .map_while(|line| (!line.is_empty()).then(|| line.trim()))
+        .collect();
+    lines.join(" ").trim_start_matches("error: ").to_owned()
+}
+
+/// Tests the unit. Returns the exit status, or why nothing could be tested.
+fn test(cli: Cli) -> anyhow::Result<u8> {
     let cases = cli.cases()?;
     if cli.list {
-        program::say(table::list(&cases).trim_end());
+        say(table::list(&cases).trim_end());
         return Ok(0);
     }
+    let cli = cli.with_bench_file()?;
     cli.reports.check()?;
     let profile = cli.read_profile()?;
-    let mode = cli.mode(profile.as_ref())?;
+    let mode = cli.mode(profile.as_ref());
     let mut endpoint = cli.open(mode)?;
+    // Wrong arguments have been reported by now, before anything is done to the board.
+    cli.on_bench.prepare()?;
+    if let Some(file) = &cli.on_bench.update {
+        // The other program needs the port.
+        drop(endpoint);
+        shell::update(&cli.reached()?, file)?;
+        endpoint = cli.open(mode)?;
+    }
     if cli.trace {
         endpoint = Box::new(Trace::new(endpoint, io::stderr()));
     }
@@ -37,33 +83,67 @@ fn test(cli: &Cli) -> anyhow::Result<u8> {
         profile: profile.as_ref(),
         allow_config: cli.allow_config,
     };
-    let target = probe(endpoint.as_mut(), &given)?;
-    let name = endpoint.name();
-    program::say(format_args!("{name}: {}", found(&target)));
-    let mut outcomes = Vec::new();
-    let report = |outcome: &run::Outcome| program::say(table::row(outcome));
+    let mut report = Report {
+        about: About::here(cli.serial.as_deref(), register_map::commit!()),
+        endpoint: endpoint.name(),
+        ..Report::default()
+    };
+    let mut target = probe(endpoint.as_mut(), &given)?;
+    target.hil = cli.of_bench();
+    is_wanted(&cli, &target)?;
+    let mut bench = Bench::new(endpoint.as_mut(), &target);
+    let unit = target.modio.map(|modio| Unit::ask(&mut bench, modio));
+    report.about.unit = unit.transpose()?;
+    say(format_args!("{}: {}", report.endpoint, found(&target)));
+    for (name, value) in report.about.properties() {
+        say(format_args!("{name}: {value}"));
+    }
+    let least = each_rate::least(&bench).as_secs();
+    if least > 0 {
+        let requests = target.hil.requests;
+        say(format_args!(
+            "{requests} requests at each rate take {least} s or more"
+        ));
+    }
     let stop = interrupt::catch()?;
-    let go_on = || !stop.load(Ordering::Relaxed);
-    let ended = run::run_while(
+    let ended = run_until(
         endpoint.as_mut(),
         &target,
         &cases,
-        go_on,
-        report,
-        &mut outcomes,
+        stop,
+        |outcome| say(table::row(outcome)),
+        &mut report.outcomes,
     );
+    report.interrupted = stop.load(Ordering::Relaxed);
     // The results up to an error are reported, too.
-    program::say(table::summary(&outcomes));
-    let json = json::value(&name, &outcomes);
-    let written = cli.reports.write(&junit::document(&name, &outcomes), &json);
+    say(table::summary(&report.outcomes));
+    let written = cli
+        .reports
+        .write(&junit::document(&report), &json::value(&report));
     ended?;
     written?;
-    if !go_on() {
+    if report.interrupted {
         return Ok(interrupt::STATUS);
     }
     // The documents of the modio promise what the interpretations demand.
     let strict = cli.strict || target.modio.is_some();
-    Ok(u8::from(Totals::of(&outcomes).counted(strict) > 0))
+    Ok(u8::from(Totals::of(&report.outcomes).counted(strict) > 0))
+}
+
+/// Checks that the unit is a modio with the module that the user expects, if the user does.
+fn is_wanted(cli: &Cli, target: &Target) -> anyhow::Result<()> {
+    let (unit, module) = (target.unit, target.modio.map(|modio| modio.module()));
+    ensure!(
+        module.is_some() || cli.hil.is_none() && cli.module.is_none(),
+        "unit {unit} is not a modio"
+    );
+    if let Some((module, wanted)) = module.zip(cli.module) {
+        ensure!(
+            module == wanted,
+            "unit {unit} has the module {module} in force, but the bench has {wanted}"
+        );
+    }
+    Ok(())
 }
 
 /// Returns the results of the probe, in one line.

@@ -11,6 +11,7 @@ use crate::bench::Bench;
 use crate::case::Check;
 use crate::endpoint::Endpoint;
 use crate::frame::{Mode, Reply};
+use crate::hil::Hil;
 use crate::points::pdu;
 use crate::profile::Profile;
 use crate::target::Patience;
@@ -54,6 +55,7 @@ pub fn probe(endpoint: &mut dyn Endpoint, given: &Given<'_>) -> Result<Target> {
         strict_t15: given.profile.and_then(|profile| profile.strict_t15),
         modio: None,
         ping: vec![8, 0, 0, 0xA5, 0x37],
+        hil: Hil::default(),
     };
     let (line, unit) = (endpoint.line(), given.unit);
     let listed = given.profile.and_then(|profile| profile.functions.as_ref());

@@ -1,27 +1,5 @@
-//! A profile describes a device other than a modio in TOML, so that any Modbus server can be tested.
-//!
-//! ```toml
-//! unit = 17
-//! mode = "rtu"                      # or "ascii"; "rtu" when left out
-//! functions = [1, 3, 5, 6, 15, 16]  # probed when left out
-//! strict_t15 = true                 # frames with a gap above t1.5 are dropped; both are right when left out
-//!
-//! [coils]
-//! read = ["0-99"]
-//! write = ["0-15"]                  # these are written to, and restored
-//!
-//! [holding_registers]
-//! read = ["0x0000-0x00FF"]
-//! write = ["0x0010-0x0013"]
-//! values = [1, 4000]                # two values that they accept
-//! refused = 5000                    # a value that they refuse with exception 03, if there is one
-//!
-//! [discrete_inputs]
-//! read = ["0-7"]
-//!
-//! [input_registers]
-//! read = ["0-9"]
-//! ```
+//! A profile describes a device other than a modio in TOML, so that any Modbus server can be tested. docs/conformance.md
+//! has an example.
 //!
 //! One request can span a whole run. The addresses before and after a run do not exist.
 
@@ -37,8 +15,8 @@ use crate::target::{Span, Words};
 pub struct Profile {
     /// The unit's address.
     pub unit: Option<u8>,
-    /// `rtu` or `ascii`.
-    mode: Option<String>,
+    /// The form of its frames.
+    pub mode: Option<Mode>,
     /// The functions that it has.
     pub functions: Option<Vec<u8>>,
     /// Whether the unit drops a frame with a gap above t1.5.
@@ -81,19 +59,8 @@ impl Profile {
         toml::from_str(text).map_err(|error| anyhow!(error.to_string().trim().replace('\n', " ")))
     }
 
-    /// Returns the mode, if the profile names it.
-    pub fn mode(&self) -> Result<Option<Mode>> {
-        Ok(match self.mode.as_deref() {
-            None => None,
-            Some("rtu") => Some(Mode::Rtu),
-            Some("ascii") => Some(Mode::Ascii),
-            Some(other) => bail!("mode {other:?} is neither \"rtu\" nor \"ascii\""),
-        })
-    }
-
     /// Returns the unit's points. The error is one line.
     pub fn known(&self) -> Result<Known> {
-        self.mode()?;
         ensure!(
             self.unit != Some(0),
             "unit 0 is the broadcast address: a unit has an address from 1"
@@ -190,18 +157,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn example_in_the_documentation_is_a_profile() {
-        let text: String = include_str!("profile.rs")
-            .lines()
-            .skip_while(|line| *line != "//! ```toml")
-            .skip(1)
-            .take_while(|line| *line != "//! ```")
-            .map(|line| format!("{}\n", line.trim_start_matches("//!")))
-            .collect();
-        let profile = Profile::parse(&text).unwrap();
+    fn example_in_the_manual_is_a_profile() {
+        let manual = include_str!("../../../docs/conformance.md");
+        let (_, example) = manual.split_once("```toml\n").unwrap();
+        let profile = Profile::parse(example.split("```").next().unwrap()).unwrap();
         let known = profile.known().unwrap();
-        assert_eq!(profile.unit, Some(17));
-        assert_eq!(profile.mode().unwrap(), Some(Mode::Rtu));
+        assert_eq!((profile.unit, profile.mode), (Some(17), None));
+        let ascii = Profile::parse("mode = \"ascii\"").unwrap();
+        assert_eq!(ascii.mode, Some(Mode::Ascii));
         assert_eq!(known.readable[2], [Span::of(0, 256)]);
         assert_eq!(known.bits, Some(Span::of(0, 16)));
         let words = known.words.unwrap();
@@ -214,7 +177,7 @@ mod tests {
         for (text, part) in [
             ("unit = 300", "unit"),
             ("colour = 1", "colour"),
-            ("mode = \"tcp\"", "neither"),
+            ("mode = \"tcp\"", "`rtu` or `ascii`"),
             ("[coils]\nread = ['5-3']", "5-3"),
             ("[coils]\nread = ['0-70000']", "70000"),
             ("[holding_registers]\nread = ['1']\nwrite = ['1']", "values"),

@@ -1,15 +1,18 @@
 //! Runs cases one after another, skips those that do not apply, and leaves the unit as it was.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use modbus_line::Parity;
 use register_map::codes::Command;
 use register_map::configuration::COMMAND;
+use serde_json::Value;
 
 use crate::bench::Bench;
-use crate::case::{Case, Failure, Need, Stop};
+use crate::case::{Case, Failure, Need, Part, Run, Stop};
 use crate::endpoint::{Broken, Endpoint};
 use crate::frame::Mode;
+use crate::hil::bench_file::Wire;
 use crate::points::pdu;
 use crate::target::{Support, Target};
 
@@ -24,17 +27,51 @@ pub enum Verdict {
     Failed(Failure),
 }
 
-/// The result of a case.
-#[derive(Clone)]
+/// The result of a case, or of a part of it.
+#[derive(Clone, Debug)]
 pub struct Outcome {
     /// The case.
     pub case: Case,
+    /// The name: that of the case, in which that of a part replaces what is behind the slash.
+    pub name: String,
     /// How it ended.
     pub verdict: Verdict,
+    /// What was measured, for people; it may have several lines.
+    pub note: String,
+    /// What was measured, for programs.
+    pub measured: Value,
     /// How long it took by the endpoint's clock.
     pub time: Duration,
     /// Number of due replies that were missing, so that the request was repeated.
     pub asked_again: u32,
+}
+
+impl Outcome {
+    /// Returns the result of a case that has no parts.
+    pub fn of(case: Case, verdict: Verdict, time: Duration, asked_again: u32) -> Self {
+        Self {
+            case,
+            name: case.name.to_owned(),
+            verdict,
+            note: String::new(),
+            measured: Value::Null,
+            time,
+            asked_again,
+        }
+    }
+
+    fn of_part(case: Case, part: Part) -> Self {
+        let (group, _) = case.name.split_once('/').unwrap_or_default();
+        let verdict = part
+            .result
+            .map_or_else(Verdict::Failed, |()| Verdict::Passed);
+        Self {
+            name: format!("{group}/{}", part.name),
+            note: part.note,
+            measured: part.measured,
+            ..Self::of(case, verdict, part.time, 0)
+        }
+    }
 }
 
 /// Runs these cases.
@@ -44,42 +81,41 @@ pub fn run(
     cases: &[Case],
 ) -> Result<Vec<Outcome>, Broken> {
     let mut outcomes = Vec::new();
-    run_while(endpoint, target, cases, || true, |_| {}, &mut outcomes)?;
+    let never = AtomicBool::new(false);
+    run_until(endpoint, target, cases, &never, |_| {}, &mut outcomes)?;
     Ok(outcomes)
 }
 
-/// Runs these cases until `go_on` returns false. `go_on` is called before each case, so a case that has begun also ends
-/// and restores the unit. Adds each outcome to `outcomes`, and calls `report` with it. When the endpoint no longer
-/// works, `outcomes` has the outcomes up to then.
-pub fn run_while(
+/// Runs these cases until `stop` is set. A case that has begun then also ends and restores the unit. Adds each outcome to
+/// `outcomes`, and calls `report` with it. When the endpoint no longer works, `outcomes` has the outcomes up to then.
+pub fn run_until(
     endpoint: &mut dyn Endpoint,
     target: &Target,
     cases: &[Case],
-    mut go_on: impl FnMut() -> bool,
+    stop: &AtomicBool,
     mut report: impl FnMut(&Outcome),
     outcomes: &mut Vec<Outcome>,
 ) -> Result<(), Broken> {
+    let mut done = |outcome: Outcome| {
+        report(&outcome);
+        outcomes.push(outcome);
+    };
     for case in cases {
-        if !go_on() {
+        if stop.load(Ordering::Relaxed) {
             break;
         }
-        let begin = endpoint.now();
         let lacking = case
             .needs
             .iter()
             .find_map(|need| lacking(*need, endpoint, target));
-        let (verdict, asked_again) = match lacking {
-            Some(why) => (Verdict::Skipped(why), 0),
-            None => one(endpoint, target, case)?,
-        };
-        let outcome = Outcome {
-            case: *case,
-            verdict,
-            time: endpoint.now().saturating_sub(begin),
-            asked_again,
-        };
-        report(&outcome);
-        outcomes.push(outcome);
+        match lacking {
+            Some(why) => done(Outcome::of(*case, Verdict::Skipped(why), Duration::ZERO, 0)),
+            None => {
+                let mut bench = Bench::new(endpoint, target);
+                bench.stop = stop;
+                one(bench, case, &mut done)?;
+            }
+        }
     }
     if target.allow_config && target.modio.is_some() {
         // Settings that cases have changed and restored still count as unsaved changes. Drop these changes.
@@ -93,17 +129,15 @@ pub fn run_while(
     Ok(())
 }
 
-fn one(
-    endpoint: &mut dyn Endpoint,
-    target: &Target,
-    case: &Case,
-) -> Result<(Verdict, u32), Broken> {
-    let mut bench = Bench::new(endpoint, target);
+/// Runs a case, and calls `done` with its outcome, or with those of its parts. A case that has parts gets a further outcome
+/// when it did not come to its end.
+fn one(mut bench: Bench<'_>, case: &Case, done: &mut dyn FnMut(Outcome)) -> Result<(), Broken> {
+    let begin = bench.endpoint.now();
     let writes = case
         .needs
         .iter()
         .any(|need| matches!(need, Need::Bits | Need::Words));
-    let locked = case.needs.contains(&Need::Words) && target.words.is_some_and(|w| w.locked);
+    let locked = case.needs.contains(&Need::Words) && bench.target.words.is_some_and(|w| w.locked);
     let mut before = None;
     let result = (|| {
         if case.needs.contains(&Need::LockClosed) {
@@ -115,7 +149,10 @@ fn one(
         if writes {
             before = Some(bench.snapshot()?);
         }
-        (case.run)(&mut bench)
+        match case.run {
+            Run::Whole(run) => run(&mut bench),
+            Run::Parts(run) => run(&mut bench, &mut |part| done(Outcome::of_part(*case, part))),
+        }
     })();
     let restored = match &before {
         Some(before) => bench.restore(before),
@@ -123,22 +160,26 @@ fn one(
     };
     let complaints = bench.endpoint.take_complaints()?;
     let verdict = match result.and(restored) {
-        Ok(()) if complaints.is_empty() => Verdict::Passed,
-        Ok(()) => Verdict::Failed(Failure {
+        Ok(()) if !complaints.is_empty() => Verdict::Failed(Failure {
             sent: case.about.to_owned(),
             came: complaints.join("; "),
             wanted: "no action of the firmware that a real part does not allow".to_owned(),
         }),
+        Ok(()) if matches!(case.run, Run::Parts(_)) => return Ok(()),
+        Ok(()) => Verdict::Passed,
         Err(Stop::Skip(why)) => Verdict::Skipped(why),
         Err(Stop::Fail(failure)) => Verdict::Failed(failure),
         Err(Stop::Broken(broken)) => return Err(broken),
     };
-    Ok((verdict, bench.asked_again))
+    let time = bench.endpoint.now().saturating_sub(begin);
+    done(Outcome::of(*case, verdict, time, bench.asked_again));
+    Ok(())
 }
 
 /// Returns the reason why a need is not met, if it is not met.
 fn lacking(need: Need, endpoint: &dyn Endpoint, target: &Target) -> Option<String> {
     let able = endpoint.abilities();
+    let mut wires = target.hil.wires.iter();
     let (met, why) = match need {
         Need::Function(function) => {
             let how = match target.functions.get(&function) {
@@ -189,6 +230,19 @@ fn lacking(need: Need, endpoint: &dyn Endpoint, target: &Target) -> Option<Strin
         Need::Modio => (target.modio.is_some(), "about the modio only"),
         Need::Rtu => (target.mode == Mode::Rtu, "about RTU framing"),
         Need::Ascii => (target.mode == Mode::Ascii, "about ASCII framing: --ascii"),
+        Need::Requests => (target.hil.requests > 0, "measures with --requests only"),
+        Need::Wires => (
+            wires.any(Wire::is_digital),
+            "no [[wire]] in a bench file: --bench",
+        ),
+        Need::Pulses => (
+            wires.any(Wire::has_pulses),
+            "no [[wire]] with pulses in a bench file: --bench",
+        ),
+        Need::AnalogWires => (
+            wires.any(|wire| !wire.is_digital()),
+            "no [[analog]] in a bench file: --bench",
+        ),
     };
     (!met).then(|| why.to_owned())
 }

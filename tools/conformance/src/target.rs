@@ -10,6 +10,7 @@ use register_map::points::{self, Kind};
 use register_map::{Board, Module};
 
 use crate::frame::Mode;
+use crate::hil::Hil;
 
 /// Waiting times.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -200,6 +201,8 @@ pub struct Target {
     pub modio: Option<Modio>,
     /// The PDU of a request that the unit answers, and that has no effect.
     pub ping: Vec<u8>,
+    /// What a bench adds.
+    pub hil: Hil,
 }
 
 impl Target {
@@ -272,6 +275,7 @@ mod tests {
             strict_t15: None,
             modio: None,
             ping: vec![],
+            hil: Hil::default(),
         }
     }
 

@@ -17,11 +17,10 @@ use crate::toolchain::Machine;
 use crate::workspace::{self, Workspace};
 
 /// Packages, and their programs.
-const PROGRAMS: [(&str, &str); 4] = [
+const PROGRAMS: [(&str, &str); 3] = [
     ("modioctl", "modioctl"),
     ("sim", "modio-sim"),
     ("conformance", "modio-conformance"),
-    ("hil", "modio-hil"),
 ];
 
 /// Builds the programs for a target, the simulator with the loaders and images of a directory in it, and writes them and

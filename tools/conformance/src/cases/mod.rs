@@ -8,6 +8,7 @@ mod configuration;
 mod damage;
 mod diagnostics;
 mod dispatch;
+pub mod each_rate;
 mod events;
 mod fast;
 mod files;
@@ -21,15 +22,17 @@ mod mask;
 mod outputs;
 mod power;
 mod read;
+mod remote;
 mod settings;
-pub mod timing;
+mod timing;
+mod wires;
 mod worked;
 mod write_bits;
 mod write_words;
 
 use crate::case::{Case, Need};
 
-/// Returns every case, in the order in which they run. Cases that need a closed lock are first, because it takes a minute
+/// Returns every case that does not need a bench, in the order in which they run. Cases that need a closed lock are first, because it takes a minute
 /// to close. Cases that reset counters are late, and cases that restart the unit are last.
 pub fn all() -> Vec<Case> {
     let mut all = [
@@ -68,6 +71,11 @@ pub fn all() -> Vec<Case> {
     all
 }
 
+/// Returns the cases that need what the user or a bench file says about a bench.
+pub fn of_bench() -> Vec<Case> {
+    [each_rate::CASES, wires::CASES].concat()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -90,7 +98,7 @@ mod tests {
     #[test]
     fn case_has_a_unique_name_a_source_and_a_demand() {
         let mut names = BTreeSet::new();
-        for case in all() {
+        for case in [all(), of_bench()].concat() {
             assert!(names.insert(case.name), "{} twice", case.name);
             assert!(case.name.contains('/') && !case.name.contains(' '));
             let known = ["V1.02 ", "V1.1b3 ", "Fast Modbus", "map", "manual"];

@@ -26,11 +26,7 @@ pub(super) const CASES: &[Case] = &[
 ];
 
 /// Returns the shortest t3.5 that a unit may use, or the silence that a modio is set to instead.
-///
-/// # Errors
-///
-/// [`Stop`](crate::case::Stop) when the unit does not report its setting.
-pub fn silence(bench: &mut Bench<'_>) -> Check<Duration> {
+pub(super) fn silence(bench: &mut Bench<'_>) -> Check<Duration> {
     let line = bench.endpoint.line();
     if bench.target.modio.is_some() {
         let gap = bench.read_word(register_map::configuration::FRAME_GAP)?;

@@ -59,12 +59,18 @@ impl Fitting {
 
 /// The virtual board, which carries out the requests of the exact-line protocol.
 pub struct InProcess {
-    board: Board,
+    /// The board.
+    pub board: Board,
     session: Session,
 }
 
 /// Starts a board fitted like this. Returns the master's end of its line.
 pub fn start(fitting: &Fitting) -> Result<ExactLine<InProcess>, Broken> {
+    ExactLine::new(board(fitting)?)
+}
+
+/// Starts a board fitted like this.
+pub fn board(fitting: &Fitting) -> Result<InProcess, Broken> {
     let elf = Image::read(&fitting.elf).map_err(|e| Broken(e.to_string()))?;
     let unknown = || Broken(format!("the simulator does not know the {}", fitting.board));
     let mut config = Config {
@@ -98,7 +104,7 @@ pub fn start(fitting: &Fitting) -> Result<ExactLine<InProcess>, Broken> {
     };
     let line = Request::Line(fitting.line.baud, fitting.line.format.to_string());
     server.ask(&line).map_err(Broken)?;
-    ExactLine::new(server)
+    Ok(server)
 }
 
 impl Transport for InProcess {

@@ -11,6 +11,7 @@ use modbus_line::port::Port;
 use serial2::{IntoSettings as _, SerialPort};
 
 use super::{Abilities, Broken, Endpoint, Piece, Received};
+use crate::hil::shell::Power;
 
 /// Longest time that one read waits, before the clock is read again.
 const SLICE: Duration = Duration::from_millis(5);
@@ -37,6 +38,7 @@ pub struct Stream {
     name: String,
     line: LineFormat,
     begin: Instant,
+    power: Option<Power>,
 }
 
 impl Stream {
@@ -61,7 +63,15 @@ impl Stream {
             name,
             line,
             begin: Instant::now(),
+            power: None,
         }
+    }
+
+    /// Returns the same connection to a unit whose power a command switches, if there is one.
+    #[must_use]
+    pub fn with_power(mut self, command: Option<String>) -> Self {
+        self.power = command.map(Power::new);
+        self
     }
 
     fn write(&mut self, bytes: &[u8]) -> Result<(), Broken> {
@@ -138,6 +148,7 @@ impl Endpoint for Stream {
 
     fn abilities(&self) -> Abilities {
         Abilities {
+            power: self.power.is_some(),
             set_line: matches!(self.carrier, Carrier::Serial(_)),
             character_time: true,
             start_bit: true,
@@ -194,6 +205,12 @@ impl Endpoint for Stream {
         self.write(&waiting)?;
         thread::sleep(self.line.characters(waiting.len()));
         Ok(self.now())
+    }
+
+    fn set_power(&mut self, on: bool) -> Result<(), Broken> {
+        let none = || Broken("no --power-cmd".to_owned());
+        let switched = self.power.as_mut().ok_or_else(none)?.switch(on);
+        switched.map_err(|error| Broken(format!("{error:#}")))
     }
 
     fn flush(&mut self) -> Result<Vec<Received>, Broken> {

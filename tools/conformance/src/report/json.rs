@@ -2,39 +2,28 @@
 
 use serde_json::{Value, json};
 
-use crate::report::Totals;
+use crate::report::{Report, Totals};
 use crate::run::{Outcome, Verdict};
 
-/// Returns the outcomes as a JSON value; `endpoint` is the name of the endpoint.
-pub fn value(endpoint: &str, outcomes: &[Outcome]) -> Value {
-    let totals = Totals::of(outcomes);
-    let cases: Vec<Value> = outcomes
-        .iter()
-        .map(|outcome| {
-            let mut value = result(&outcome.verdict);
-            value["name"] = json!(outcome.case.name);
-            value["section"] = json!(outcome.case.section);
-            value["kind"] = json!(outcome.case.kind.name());
-            value["about"] = json!(outcome.case.about);
-            value["seconds"] = json!(outcome.time.as_secs_f64());
-            value["asked_again"] = json!(outcome.asked_again);
-            value
-        })
-        .collect();
+/// Returns the run as a JSON value.
+pub fn value(report: &Report) -> Value {
+    let totals = Totals::of(&report.outcomes);
     json!({
-        "endpoint": endpoint,
+        "about": report.about,
+        "endpoint": report.endpoint,
+        "interrupted": report.interrupted,
         "passed": totals.passed,
         "failed": totals.failed,
         "failed_interpretations": totals.failed_interpretations,
         "skipped": totals.skipped,
         "asked_again": totals.asked_again,
-        "cases": cases,
+        "cases": report.outcomes.iter().map(case).collect::<Vec<_>>(),
     })
 }
 
-/// Returns a verdict and its reason as a JSON value.
-pub fn result(verdict: &Verdict) -> Value {
-    match verdict {
+/// Returns the result of a case, with its reason, as a JSON value.
+fn case(outcome: &Outcome) -> Value {
+    let mut value = match &outcome.verdict {
         Verdict::Passed => json!({ "result": "passed" }),
         Verdict::Skipped(why) => json!({ "result": "skipped", "reason": why }),
         Verdict::Failed(failure) => json!({
@@ -43,7 +32,16 @@ pub fn result(verdict: &Verdict) -> Value {
             "came": failure.came,
             "wanted": failure.wanted,
         }),
-    }
+    };
+    value["name"] = json!(outcome.name);
+    value["section"] = json!(outcome.case.section);
+    value["kind"] = json!(outcome.case.kind.name());
+    value["about"] = json!(outcome.case.about);
+    value["note"] = json!(outcome.note);
+    value["measured"] = outcome.measured.clone();
+    value["seconds"] = json!(outcome.time.as_secs_f64());
+    value["asked_again"] = json!(outcome.asked_again);
+    value
 }
 
 #[cfg(test)]
@@ -52,7 +50,7 @@ mod tests {
 
     #[test]
     fn json_has_every_outcome() {
-        let value = value("somewhere", &crate::report::some_outcomes());
+        let value = value(&crate::report::some_report());
         assert_eq!(value["failed"], 1);
         let results: Vec<&str> = value["cases"]
             .as_array()

@@ -1,11 +1,26 @@
 //! Reports of a run: a table for people, JUnit XML and JSON for machines.
 
+pub mod files;
 pub mod json;
 pub mod junit;
 pub mod table;
 
+use crate::about::About;
 use crate::case::Kind;
 use crate::run::{Outcome, Verdict};
+
+/// A run, for the reports.
+#[derive(Clone, Debug, Default)]
+pub struct Report {
+    /// The circumstances of the run.
+    pub about: About,
+    /// The name of the endpoint.
+    pub endpoint: String,
+    /// The results.
+    pub outcomes: Vec<Outcome>,
+    /// Whether the user ended the run early.
+    pub interrupted: bool,
+}
 
 /// Number of cases by their result.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -27,23 +42,18 @@ impl Totals {
     pub fn of(outcomes: &[Outcome]) -> Self {
         let mut totals = Self::default();
         for outcome in outcomes {
-            totals.count(&outcome.verdict);
-            let failed = matches!(outcome.verdict, Verdict::Failed(_));
-            if failed && outcome.case.kind == Kind::Interpretation {
-                totals.failed_interpretations += 1;
+            match &outcome.verdict {
+                Verdict::Passed => totals.passed += 1,
+                Verdict::Failed(_) => {
+                    totals.failed += 1;
+                    totals.failed_interpretations +=
+                        usize::from(outcome.case.kind == Kind::Interpretation);
+                }
+                Verdict::Skipped(_) => totals.skipped += 1,
             }
             totals.asked_again += outcome.asked_again;
         }
         totals
-    }
-
-    /// Adds one verdict.
-    pub fn count(&mut self, verdict: &Verdict) {
-        match verdict {
-            Verdict::Passed => self.passed += 1,
-            Verdict::Failed(_) => self.failed += 1,
-            Verdict::Skipped(_) => self.skipped += 1,
-        }
     }
 
     /// Returns the number of failed cases that make the run fail. Interpretations count only when `strict` is set.
@@ -66,7 +76,7 @@ fn asked_again(times: u32) -> String {
 }
 
 #[cfg(test)]
-fn some_outcomes() -> Vec<Outcome> {
+fn some_report() -> Report {
     use crate::case::Failure;
     use std::time::Duration;
     let verdicts = [
@@ -78,14 +88,13 @@ fn some_outcomes() -> Vec<Outcome> {
             wanted: "a reply".to_owned(),
         }),
     ];
-    crate::cases::all()
+    let outcomes = crate::cases::all()
         .into_iter()
         .zip(verdicts)
-        .map(|(case, verdict)| Outcome {
-            case,
-            verdict,
-            time: Duration::from_millis(1250),
-            asked_again: 0,
-        })
-        .collect()
+        .map(|(case, verdict)| Outcome::of(case, verdict, Duration::from_millis(1250), 0));
+    Report {
+        endpoint: "a \"unit\"".to_owned(),
+        outcomes: outcomes.collect(),
+        ..Report::default()
+    }
 }

@@ -11,11 +11,11 @@ pub fn row(outcome: &Outcome) -> String {
         Verdict::Skipped(why) => ("skipped", why.clone()),
         Verdict::Failed(_) => ("FAILED", asked_again(outcome.asked_again)),
     };
-    let case = outcome.case;
+    let (case, note) = (outcome.case, &outcome.note);
     let seconds = outcome.time.as_secs_f64();
     let line = format!(
-        "{:<38} {:<28} {:<8} {:>7.2} s  {reason}",
-        case.name, case.section, result, seconds
+        "{:<38} {:<28} {:<8} {:>7.2} s  {reason}{note}",
+        outcome.name, case.section, result, seconds
     );
     let line = line.trim_end().to_owned();
     match &outcome.verdict {
@@ -83,7 +83,7 @@ mod tests {
 
     #[test]
     fn row_of_a_failed_case_has_the_whole_failure() {
-        let outcomes = crate::report::some_outcomes();
+        let outcomes = crate::report::some_report().outcomes;
         let rows: Vec<String> = outcomes.iter().map(row).collect();
         assert!(rows[0].contains(" ok ") && !rows[0].contains('\n'));
         assert!(rows[1].contains("skipped") && rows[1].ends_with("function 07"));

@@ -1,7 +1,9 @@
 //! The command: its exit status, its output and its files. It tests the reference server over a socket.
 
+use std::fs;
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream};
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -51,20 +53,25 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-/// Serves one master on a socket until it disconnects. A silence of 8 ms ends a frame.
-fn serve(mut stream: TcpStream, fault: Option<Fault>) {
-    let line = LineFormat::default();
-    let mut unit = Unit::new(fault, Mode::Rtu, line);
+/// Serves one master on a socket until it disconnects. A silence of 8 ms ends a frame. A file with `on` or `off` switches
+/// the unit's power, and is removed then.
+fn serve(mut stream: TcpStream, mut unit: Unit, power: &Path) {
     let begin = Instant::now();
+    let mut powered = true;
     stream
         .set_read_timeout(Some(Duration::from_millis(8)))
         .expect("a socket takes a time-out");
     let mut buffer = [0; 1024];
     loop {
+        if let Ok(state) = fs::read_to_string(power) {
+            powered = state.trim() == "on";
+            unit.start(begin.elapsed());
+            fs::remove_file(power).expect("the file can be removed");
+        }
         match stream.read(&mut buffer) {
             Ok(0) => return,
             Ok(length) => {
-                for byte in &buffer[..length] {
+                for byte in buffer[..length].iter().filter(|_| powered) {
                     let at = begin.elapsed();
                     unit.receive(Character {
                         byte: *byte,
@@ -87,16 +94,25 @@ fn serve(mut stream: TcpStream, fault: Option<Fault>) {
     }
 }
 
-/// Starts a server with this fault. Returns its address.
-fn server(fault: Option<Fault>) -> String {
+/// Starts a server of such units. Returns its address.
+fn served(unit: impl Fn() -> Unit + Send + 'static, power: PathBuf) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
     let address = listener.local_addr().expect("bound").to_string();
     thread::spawn(move || {
         for stream in listener.incoming().flatten() {
-            thread::spawn(move || serve(stream, fault));
+            let (unit, power) = (unit(), power.clone());
+            thread::spawn(move || serve(stream, unit, &power));
         }
     });
     address
+}
+
+/// Starts a server with this fault. Returns its address.
+fn server(fault: Option<Fault>) -> String {
+    served(
+        move || Unit::new(fault, Mode::Rtu, LineFormat::default()),
+        PathBuf::new(),
+    )
 }
 
 #[test]
@@ -190,4 +206,82 @@ fn list_names_every_case() {
     for case in conformance::cases::all() {
         assert!(list.contains(&format!("`{}`", case.name)), "{}", case.name);
     }
+}
+
+/// Tests a modio with these arguments and this bench file, in which a command switches the power as POWER says. Returns the
+/// status, the report in JSON, and the output.
+#[cfg(unix)]
+fn hil(bench: &str, arguments: &str) -> (Option<i32>, serde_json::Value, String) {
+    let directory = tempfile::tempdir().expect("a directory");
+    let at = |name: &str| directory.path().join(name);
+    let power = at("power").display().to_string();
+    let script = format!(
+        "echo $1 > '{power}.new'; mv '{power}.new' '{power}'; while [ -e '{power}' ]; do sleep 0.02; done"
+    );
+    fs::write(at("switch"), script).expect("written");
+    let address = served(
+        || Unit::modio(None, Mode::Rtu, LineFormat::default()),
+        at("power"),
+    );
+    let bench = bench.replace("POWER", &format!("sh {}", at("switch").display()));
+    fs::write(at("bench.toml"), bench).expect("written");
+    let output = command(&format!(
+        "hil --tcp {address} --patience 60 --bench {} --json {} {arguments}",
+        at("bench.toml").display(),
+        at("report.json").display()
+    ));
+    let report = fs::read_to_string(at("report.json")).unwrap_or_default();
+    (
+        output.status.code(),
+        serde_json::from_str(&report).unwrap_or_default(),
+        text(&output.stdout) + &text(&output.stderr),
+    )
+}
+
+#[cfg(unix)]
+#[test]
+fn power_is_switched_by_the_command_of_the_bench_file() {
+    let case = "--only outputs/start-value";
+    for (bench, status, wanted) in [
+        ("", 0, "skipped"),
+        ("power_cmd = 'POWER'", 0, "passed"),
+        ("power_cmd = 'false'", 2, ""),
+    ] {
+        let (ended, report, text) = hil(bench, case);
+        let result = report["cases"][0]["result"].as_str();
+        assert_eq!(
+            (ended, result.unwrap_or_default()),
+            (Some(status), wanted),
+            "{text}"
+        );
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn report_of_a_bench_has_the_unit_and_what_was_measured() {
+    // The socket carries bytes in no time, so the turnarounds may be too short.
+    let (_, report, text) = hil("module = '2relay'", "--only each-rate --requests 3");
+    assert!(text.contains("3 sent, 0 lost, 0 wrong"), "{text}");
+    assert_eq!(report["cases"][0]["name"], "timing/9600 8N2");
+    assert_eq!(report["cases"][0]["measured"]["sent"], 3);
+    let about = &report["about"];
+    assert!(about["adapter"].is_null(), "{report}");
+    let unit = &about["unit"];
+    // The register map of the reference is older than the commit of the image.
+    assert_eq!(
+        (&unit["module"], unit["commit"].is_null()),
+        (&"2relay".into(), true)
+    );
+    assert_eq!(unit["firmware"], "0.0.0");
+}
+
+#[cfg(unix)]
+#[test]
+fn unit_with_another_module_than_the_bench_is_not_tested() {
+    let (status, report, text) = hil("module = '4ao'", "");
+    assert_eq!(status, Some(2), "{text}");
+    assert!(report.is_null(), "{report}");
+    let error = "unit 1 has the module 2relay in force, but the bench has 4ao";
+    assert!(text.contains(error), "{text}");
 }

@@ -11,6 +11,9 @@ use super::fault::Fault;
 use super::modio_fault::ModioFault;
 use super::unit::{Character, Unit};
 
+/// Returns what the unit receives of bytes that the master sends on this line; nothing when they are lost.
+type Way = Box<dyn FnMut(&[u8], LineFormat) -> Vec<u8>>;
+
 /// Time that the unit needs to start.
 const START: Duration = Duration::from_millis(100);
 
@@ -19,6 +22,9 @@ pub struct Reference {
     now: Duration,
     powered: bool,
     starts: Option<Duration>,
+    pub way: Way,
+    /// A rate that the endpoint does not take.
+    pub lacks: Option<u32>,
 }
 
 impl Reference {
@@ -28,6 +34,8 @@ impl Reference {
             now: Duration::from_secs(1),
             powered: true,
             starts: None,
+            way: Box::new(|bytes, _| bytes.to_vec()),
+            lacks: None,
         }
     }
 
@@ -103,6 +111,9 @@ impl Endpoint for Reference {
     }
 
     fn set_line(&mut self, line: LineFormat) -> Result<(), Broken> {
+        if self.lacks == Some(line.baud) {
+            return Err(Broken(format!("this line does not take {line}")));
+        }
         self.unit.master = line;
         Ok(())
     }
@@ -130,7 +141,7 @@ impl Endpoint for Reference {
             };
             match piece {
                 Piece::Bytes(bytes) => {
-                    for byte in bytes {
+                    for byte in &(self.way)(bytes, self.unit.master) {
                         let start = self.now;
                         let character = Character {
                             start,
@@ -139,6 +150,7 @@ impl Endpoint for Reference {
                         };
                         self.character(character);
                     }
+                    self.advance(start + length * bytes.len() as u32);
                 }
                 Piece::Gap(gap) => self.advance(start + *gap),
                 Piece::BadParity(byte) => self.character(Character {

@@ -2,6 +2,7 @@
 //! makes the cases fail that have to find it.
 
 mod command;
+mod each_rate;
 mod endpoint;
 mod fast;
 mod fault;

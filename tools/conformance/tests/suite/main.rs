@@ -3,8 +3,10 @@
 
 #![cfg(feature = "sim")]
 
+mod each_rate;
 mod matrix;
 mod noise;
+mod wires;
 
 use std::env;
 use std::io::{BufRead, BufReader};
@@ -22,6 +24,7 @@ use conformance::frame::Mode;
 use conformance::probe::{Given, probe};
 use conformance::report::table;
 use conformance::run::{Outcome, Verdict, run};
+use conformance::target::Target;
 use modbus_line::LineFormat;
 use rayon::iter::{IntoParallelIterator as _, ParallelBridge as _, ParallelIterator as _};
 use register_map::board::{MODIO_02, MODIO_08};
@@ -83,8 +86,8 @@ fn line(baud: u32, format: &str) -> LineFormat {
     LineFormat::new(baud, format.parse().expect("a format"))
 }
 
-/// Runs these cases against the unit at `dip`.
-fn outcomes(endpoint: &mut dyn Endpoint, dip: u8, mode: Mode, cases: &[Case]) -> Vec<Outcome> {
+/// Asks the unit at `dip` what it has.
+fn probed(endpoint: &mut dyn Endpoint, dip: u8, mode: Mode) -> Target {
     let given = Given {
         unit: dip,
         mode,
@@ -92,7 +95,12 @@ fn outcomes(endpoint: &mut dyn Endpoint, dip: u8, mode: Mode, cases: &[Case]) ->
         profile: None,
         allow_config: true,
     };
-    let target = probe(endpoint, &given).expect("the unit answers");
+    probe(endpoint, &given).expect("the unit answers")
+}
+
+/// Runs these cases against the unit at `dip`.
+fn outcomes(endpoint: &mut dyn Endpoint, dip: u8, mode: Mode, cases: &[Case]) -> Vec<Outcome> {
+    let target = probed(endpoint, dip, mode);
     // A restart begins the count of the free stack anew, so the cases that restart the unit are last.
     let restarts = |case: &&Case| {
         let mut needs = case.needs.iter();

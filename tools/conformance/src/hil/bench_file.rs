@@ -1,29 +1,5 @@
 //! The bench file: the hardware of a bench, in TOML. Every key may be left out, and an option of the command line
-//! takes precedence over its key.
-//!
-//! ```toml
-//! port = "/dev/serial/by-id/usb-FTDI_FT232R_USB_UART_A50285BI-if00-port0"
-//! probe = "0483:3748"                  # for --flash, as `probe-rs list` shows it
-//! unit = 1
-//! baud = 9600
-//! format = "8N2"
-//! module = "4do"                       # the run ends if the first slot has another module
-//! power_cmd = "uhubctl -l 1-1 -p 2 -a" # followed by off or on
-//! reset_cmd = "./press-reset"
-//!
-//! [[wire]]                             # a digital output to a digital input
-//! from = { point = 0x0010 }            # of the unit under test, where no unit is named
-//! to = { unit = 2, point = 0x0010 }
-//! within_ms = 50                       # 100 when left out
-//! inverted = true                      # the input is off when the output is on; false when left out
-//! pulses = 100                         # number of pulses that the input must count; 0 when left out
-//!
-//! [[analog]]                           # an analog output to an analog input
-//! from = { unit = 3, point = 0x0012 }
-//! to = { unit = 3, point = 0x0010 }
-//! tolerance = 40                       # in the unit of both points: raw codes, mV or uA
-//! within_ms = 500                      # 1000 when left out: the input's filter
-//! ```
+//! takes precedence over its key. docs/hil.md has examples.
 //!
 //! Points are addresses of the register map, 0x0000 to 0x001F.
 
@@ -64,47 +40,83 @@ pub struct BenchFile {
     /// Resets the board.
     pub reset_cmd: Option<String>,
     #[serde(default)]
-    wire: Vec<Spanned<Wire>>,
+    wire: Vec<Spanned<Digital>>,
     #[serde(default)]
     analog: Vec<Spanned<Analog>>,
+    /// Outputs wired to inputs: the digital ones, then the analog ones, each in the order of the file.
+    #[serde(skip)]
+    pub wires: Vec<Wire>,
 }
 
-/// A wire from a digital output to a digital input.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields)]
+/// A wire from an output to an input.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Wire {
     /// The output.
     pub from: Place,
     /// The input.
     pub to: Place,
     /// The input follows within this time, 1 ms to 60 s.
-    #[serde(rename = "within_ms", default = "usual", deserialize_with = "within")]
     pub within: Duration,
-    /// The input is off when the output is on.
-    #[serde(default)]
-    pub inverted: bool,
-    /// Pulses to send to the input's counter; 0: none.
-    #[serde(default)]
-    pub pulses: u16,
+    /// What it carries.
+    pub carries: Carries,
 }
 
-/// A wire from an analog output to an analog input.
+/// What a wire carries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Carries {
+    /// A digital signal.
+    Bit {
+        /// The input is off when the output is on.
+        inverted: bool,
+        /// Pulses to send to the input's counter; 0: none.
+        pulses: u16,
+    },
+    /// An analog signal.
+    Word {
+        /// Largest difference between output and input, in the unit of both points.
+        tolerance: u16,
+    },
+}
+
+impl Wire {
+    /// Returns whether it carries a digital signal.
+    pub const fn is_digital(&self) -> bool {
+        matches!(self.carries, Carries::Bit { .. })
+    }
+
+    /// Returns whether pulses are sent to the counter of its input.
+    pub const fn has_pulses(&self) -> bool {
+        matches!(self.carries, Carries::Bit { pulses: 1.., .. })
+    }
+}
+
+/// A table of digital wires.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Analog {
-    /// The output.
-    pub from: Place,
-    /// The input.
-    pub to: Place,
-    /// Largest difference between output and input, in the unit of both points.
-    pub tolerance: u16,
-    /// The input follows within this time, 1 ms to 60 s.
+struct Digital {
+    from: Place,
+    to: Place,
+    #[serde(rename = "within_ms", default = "usual", deserialize_with = "within")]
+    within: Duration,
+    #[serde(default)]
+    inverted: bool,
+    #[serde(default)]
+    pulses: u16,
+}
+
+/// A table of analog wires.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Analog {
+    from: Place,
+    to: Place,
+    tolerance: u16,
     #[serde(
         rename = "within_ms",
         default = "filtered",
         deserialize_with = "within"
     )]
-    pub within: Duration,
+    within: Duration,
 }
 
 /// A point of a unit on the line.
@@ -126,12 +138,6 @@ impl fmt::Display for Place {
 }
 
 impl fmt::Display for Wire {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} to {}", self.from, self.to)
-    }
-}
-
-impl fmt::Display for Analog {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} to {}", self.from, self.to)
     }
@@ -216,47 +222,53 @@ impl BenchFile {
             (error.span().unwrap_or_default(), what)
         })?;
         let here = unit.or(file.unit).unwrap_or(1);
-        let wires = file.wire.iter_mut().map(|wire| {
-            let span = wire.span();
-            let Wire { from, to, .. } = wire.get_mut();
-            (span, from, to)
+        let digital = file.wire.iter().map(|wire| {
+            let Digital {
+                from,
+                to,
+                within,
+                inverted,
+                pulses,
+            } = *wire.get_ref();
+            let carries = Carries::Bit { inverted, pulses };
+            (wire.span(), from, to, within, carries)
         });
-        let analog = file.analog.iter_mut().map(|wire| {
-            let span = wire.span();
-            let Analog { from, to, .. } = wire.get_mut();
-            (span, from, to)
+        let analog = file.analog.iter().map(|wire| {
+            let Analog {
+                from,
+                to,
+                tolerance,
+                within,
+            } = *wire.get_ref();
+            (wire.span(), from, to, within, Carries::Word { tolerance })
         });
-        let mut ends = Vec::new();
-        for (span, from, to) in wires.chain(analog) {
-            for place in [&mut *from, &mut *to] {
+        for (span, mut from, mut to, within, carries) in digital.chain(analog) {
+            for place in [&mut from, &mut to] {
                 if place.unit == 0 {
                     place.unit = here;
                 }
             }
-            check(&mut ends, (*from, *to)).map_err(|what| (span, what))?;
+            let wire = Wire {
+                from,
+                to,
+                within,
+                carries,
+            };
+            check(&file.wires, &wire).map_err(|what| (span, what))?;
+            file.wires.push(wire);
         }
         Ok(file)
     }
-
-    /// Returns the digital outputs wired to digital inputs, in the order of the file.
-    pub fn wires(&self) -> Vec<Wire> {
-        self.wire.iter().map(|wire| *wire.get_ref()).collect()
-    }
-
-    /// Returns the analog outputs wired to analog inputs, in the order of the file.
-    pub fn analog(&self) -> Vec<Analog> {
-        self.analog.iter().map(|wire| *wire.get_ref()).collect()
-    }
 }
 
-/// Adds a wire's ends to those of the wires before it. An input has one wire, and no point is both an output and
-/// an input.
-fn check(ends: &mut Vec<(Place, Place)>, (from, to): (Place, Place)) -> Result<(), String> {
-    if ends.iter().any(|(_, other)| *other == to) {
+/// Checks a wire beside those before it. An input has one wire, and no point is both an output and an input.
+fn check(before: &[Wire], wire: &Wire) -> Result<(), String> {
+    let Wire { from, to, .. } = *wire;
+    if before.iter().any(|other| other.to == to) {
         return Err(format!("{to} has a wire already"));
     }
-    ends.push((from, to));
-    if ends.iter().any(|(other, _)| *other == to) || ends.iter().any(|(_, other)| *other == from) {
+    let mut all = before.iter().chain([wire]);
+    if all.any(|other| other.from == to || other.to == from) {
         return Err("a point is an output of one wire and an input of another".to_owned());
     }
     Ok(())

@@ -1,16 +1,16 @@
 //! The unit, the adapter, the computer and the date of a run, for the reports.
 
-use std::fmt;
 use std::path::Path;
 
 use chrono::{SecondsFormat, Utc};
 use register_map::state;
+use serde::Serialize;
 use serde_json::{Value, json};
 use serialport::{SerialPortInfo, SerialPortType};
 
-use conformance::bench::Bench;
-use conformance::case::Check;
-use conformance::target::{Modio, Span};
+use crate::bench::Bench;
+use crate::case::Check;
+use crate::target::{Modio, Span};
 
 /// First version of the register map that has the registers of [`COMMIT`].
 const MAP_WITH_COMMIT: u16 = 2;
@@ -19,47 +19,45 @@ const MAP_WITH_COMMIT: u16 = 2;
 /// whose bit 0 is set when the tree had uncommitted changes.
 const COMMIT: u16 = 0x020C;
 
-/// The circumstances of a run.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+/// The circumstances of a run. Unknown values are null in JSON.
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct About {
     /// Date and time of the begin in UTC, in the form of RFC 3339.
-    pub date: String,
+    date: String,
     /// Name, operating system and architecture of the computer.
-    pub host: String,
+    host: String,
     /// Version of this program.
-    pub version: String,
+    version: String,
     /// Commit that this program was built from.
-    pub commit: String,
+    commit: String,
     /// The USB adapter of the port, if the port has one.
-    pub adapter: Option<Adapter>,
-    /// The unit, after it has answered.
+    adapter: Option<Adapter>,
+    /// The unit, if it is a modio and has answered.
     pub unit: Option<Unit>,
 }
 
 /// A USB serial adapter.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Adapter {
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+struct Adapter {
     /// USB vendor and product identity, in hexadecimal: `0403:6001`.
-    pub id: String,
+    usb: String,
     /// Name of the manufacturer and of the product, as far as the adapter reports them.
-    pub name: String,
-    /// Its serial number, if it has one.
-    pub serial_number: Option<String>,
+    name: String,
+    serial_number: Option<String>,
 }
 
 /// The unit, read from its registers.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Unit {
-    /// Its address.
-    pub address: u8,
+    address: u8,
     /// Version of its firmware.
-    pub firmware: String,
+    firmware: String,
     /// First 32 bits of the commit that its image was built from; `None` when its register map has no commit.
-    pub commit: Option<String>,
+    commit: Option<String>,
     /// Its unique identity, in hexadecimal.
-    pub identity: String,
+    identity: String,
     /// The modules in force in its slots.
-    pub modules: Modio,
+    module: String,
 }
 
 impl About {
@@ -81,57 +79,25 @@ impl About {
         }
     }
 
-    /// Names and values, in the order in which they are reported.
-    pub fn properties(&self) -> Vec<(&'static str, String)> {
-        let mut all = vec![
-            ("date", self.date.clone()),
-            ("host", self.host.clone()),
-            ("modio-hil", self.version.clone()),
-            ("commit", self.commit.clone()),
-        ];
-        if let Some(adapter) = &self.adapter {
-            all.push(("adapter", adapter.to_string()));
-        }
-        if let Some(unit) = &self.unit {
-            all.push(("unit", unit.address.to_string()));
-            all.push(("firmware", unit.firmware.clone()));
-            all.extend(unit.commit.clone().map(|it| ("firmware commit", it)));
-            all.push(("identity", unit.identity.clone()));
-            all.push(("module", unit.modules.to_string()));
-        }
+    /// Returns names and values for people, such as `unit firmware` and `1.2.3`.
+    pub fn properties(&self) -> Vec<(String, String)> {
+        let mut all = Vec::new();
+        add("", &json!(self), &mut all);
         all
-    }
-
-    /// Returns the description in JSON. Unknown values are null.
-    pub fn json(&self) -> Value {
-        json!({
-            "date": self.date,
-            "host": self.host,
-            "version": self.version,
-            "commit": self.commit,
-            "adapter": self.adapter.as_ref().map(|adapter| json!({
-                "usb": adapter.id,
-                "name": adapter.name,
-                "serial_number": adapter.serial_number,
-            })),
-            "unit": self.unit.as_ref().map(|unit| json!({
-                "address": unit.address,
-                "firmware": unit.firmware,
-                "commit": unit.commit,
-                "identity": unit.identity,
-                "module": unit.modules.to_string(),
-            })),
-        })
     }
 }
 
-impl fmt::Display for Adapter {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} {}", self.id, self.name)?;
-        match &self.serial_number {
-            Some(number) => write!(f, ", serial number {number}"),
-            None => Ok(()),
+/// Adds the known values below a name.
+fn add(name: &str, value: &Value, all: &mut Vec<(String, String)>) {
+    match value {
+        Value::Null => {}
+        Value::Object(inner) => {
+            for (key, value) in inner {
+                add(format!("{name} {key}").trim_start(), value, all);
+            }
         }
+        Value::String(text) => all.push((name.to_owned(), text.clone())),
+        other => all.push((name.to_owned(), other.to_string())),
     }
 }
 
@@ -157,7 +123,7 @@ impl Unit {
             firmware: state::version([firmware, patch], build).to_string(),
             commit,
             identity: identity.iter().map(|word| format!("{word:04X}")).collect(),
-            modules,
+            module: modules.to_string(),
         })
     }
 }
@@ -171,7 +137,7 @@ fn adapter(port: &Path, ports: &[SerialPortInfo]) -> Option<Adapter> {
     };
     let names = [&usb.manufacturer, &usb.product].map(|name| name.clone().unwrap_or_default());
     Some(Adapter {
-        id: format!("{:04x}:{:04x}", usb.vid, usb.pid),
+        usb: format!("{:04x}:{:04x}", usb.vid, usb.pid),
         name: names.join(" ").trim().to_owned(),
         serial_number: usb.serial_number.clone(),
     })
@@ -179,9 +145,6 @@ fn adapter(port: &Path, ports: &[SerialPortInfo]) -> Option<Adapter> {
 
 #[cfg(test)]
 mod tests {
-    use register_map::Module;
-    use register_map::board::MODIO_08;
-
     use super::*;
 
     #[cfg(unix)]
@@ -210,10 +173,13 @@ mod tests {
             usb("/dev/ttyUSB7", None),
             usb(&port.to_string_lossy(), Some("A50285BI")),
         ];
+        let wanted = Adapter {
+            usb: "0403:6001".to_owned(),
+            name: "FTDI FT232R USB UART".to_owned(),
+            serial_number: Some("A50285BI".to_owned()),
+        };
         for path in [&port, &link] {
-            let shown = adapter(path, &ports).unwrap().to_string();
-            let wanted = "0403:6001 FTDI FT232R USB UART, serial number A50285BI";
-            assert_eq!(shown, wanted);
+            assert_eq!(adapter(path, &ports), Some(wanted.clone()));
         }
         assert_eq!(adapter(Path::new("/dev/pts/3"), &ports), None);
     }
@@ -222,21 +188,32 @@ mod tests {
     fn run_is_described_in_json_and_in_properties() {
         let mut about = About::here(None, "89abcdef");
         assert!(about.date.ends_with('Z') && !about.host.is_empty());
-        assert_eq!(about.json()["commit"], "89abcdef");
         about.unit = Some(Unit {
             address: 7,
             firmware: "1.2.3".to_owned(),
-            commit: Some("0123abcd".to_owned()),
+            commit: None,
             identity: "00AA".to_owned(),
-            modules: Modio {
-                board: Some(&MODIO_08),
-                modules: [Module::Do4; 8],
-            },
+            module: "4do".to_owned(),
         });
-        let modules = "1=4do 2=4do 3=4do 4=4do";
-        assert_eq!(about.json()["unit"]["module"], modules);
+        let json = json!(about);
+        assert_eq!(
+            (&json["commit"], &json["unit"]["address"]),
+            (&json!("89abcdef"), &json!(7))
+        );
+        assert!(json["adapter"].is_null() && json["unit"]["commit"].is_null());
         let properties = about.properties();
-        assert!(properties.contains(&("commit", "89abcdef".to_owned())));
-        assert!(properties.contains(&("firmware commit", "0123abcd".to_owned())));
+        for wanted in [
+            ("commit", "89abcdef"),
+            ("unit address", "7"),
+            ("unit firmware", "1.2.3"),
+        ] {
+            let right =
+                |(name, value): &(String, String)| (name.as_str(), value.as_str()) == wanted;
+            assert!(properties.iter().any(right), "{wanted:?}: {properties:?}");
+        }
+        assert!(
+            properties.iter().all(|(name, _)| name != "unit commit"),
+            "{properties:?}"
+        );
     }
 }

@@ -1,4 +1,4 @@
-//! The command `modio-hil`: the order of its actions on the board. Scripts replace the other programs.
+//! What the command does to a board before the tests, and in which order. Scripts replace the other programs.
 
 #![cfg(unix)]
 
@@ -45,9 +45,9 @@ impl Fake {
 
     fn run(&self, arguments: &[&str]) -> Output {
         let line = self.line.local_addr().unwrap().to_string();
-        Command::new(env!("CARGO_BIN_EXE_modio-hil"))
+        Command::new(env!("CARGO_BIN_EXE_modio-conformance"))
             .env("CARGO", self.at("cargo"))
-            .args(["--tcp", &line, "--patience", "10"])
+            .args(["hil", "--tcp", &line, "--patience", "10"])
             .args(arguments)
             .output()
             .unwrap()
@@ -93,7 +93,8 @@ fn wrong_argument_is_reported_before_anything_is_done_to_the_board() {
         (&["--only", "no such case"][..], "no case has such a name"),
         (&["--bench", &file], "bench.toml:2: unknown field `wires`"),
         (&["--json", "/nowhere/x"], "cannot write /nowhere/x"),
-        (&["--format", "7E1"], "no format 7E1"),
+        (&["--format", "7E1"], "RTU needs 8 data bits"),
+        (&["--no-suite", "--requests", "0"], "nothing to test"),
     ] {
         let output = fake.run(&[&["--flash", "--reset-cmd", "false"], arguments].concat());
         let error = complaint(&output);

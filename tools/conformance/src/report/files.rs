@@ -1,42 +1,10 @@
-//! What the commands of this package share: they parse their arguments, print one line and end with status 2 when
-//! nothing could be tested, and write reports to files.
+//! The files of the reports.
 
-use std::fmt::Display;
 use std::fs::{self, OpenOptions};
-use std::io::{self, Write as _};
+use std::io;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
-use anyhow::{Context as _, Result, anyhow, bail};
-use clap::Parser;
-
-/// Runs a command of this name and version with its arguments. `test` returns the exit status, or why nothing could be
-/// tested.
-pub fn run<Cli: Parser>(
-    name: &str,
-    version: &'static str,
-    test: impl FnOnce(&Cli) -> Result<u8>,
-) -> ExitCode {
-    let arguments = Cli::command().version(version).try_get_matches();
-    let tested = match arguments.and_then(|found| Cli::from_arg_matches(&found)) {
-        Ok(cli) => test(&cli),
-        Err(error) if error.use_stderr() => Err(anyhow!(one_line(&error))),
-        Err(help) => help.exit(),
-    };
-    match tested {
-        Ok(status) => ExitCode::from(status),
-        Err(error) => {
-            eprintln!("{name}: {error:#}");
-            ExitCode::from(2)
-        }
-    }
-}
-
-/// Prints one or more lines. A reader that has closed the pipe, as `head` does, is no error: the unit must still be
-/// restored, and the reports written.
-pub fn say(text: impl Display) {
-    let _ = writeln!(io::stdout(), "{text}");
-}
+use anyhow::{Context as _, Result, bail};
 
 /// The files to which reports are written.
 #[derive(clap::Args, Clone, Debug, Default)]
@@ -86,13 +54,4 @@ fn write(path: Option<&Path>, text: &str) -> Result<()> {
 
 fn cannot_write(path: &Path) -> String {
     format!("cannot write {}", path.display())
-}
-
-fn one_line(error: &clap::Error) -> String {
-    let text = error.render().to_string();
-    let lines: Vec<&str> = text
-        .lines()
-        .map_while(|line| (!line.is_empty()).then(|| line.trim()))
-        .collect();
-    lines.join(" ").trim_start_matches("error: ").to_owned()
 }

@@ -3,32 +3,8 @@
 use super::*;
 
 #[test]
-fn example_in_the_documentation_is_read() {
-    let text: String = include_str!("../bench_file.rs")
-        .lines()
-        .skip_while(|line| *line != "//! ```toml")
-        .skip(1)
-        .take_while(|line| *line != "//! ```")
-        .map(|line| format!("{}\n", line.trim_start_matches("//!")))
-        .collect();
-    let file = BenchFile::parse(&text, None).unwrap();
-    assert_eq!((file.unit, file.baud), (Some(1), Some(9600)));
-    assert_eq!(file.module, Some(Module::Do4));
-    assert_eq!(file.probe.as_deref(), Some("0483:3748"));
-    let [wire] = file.wires()[..] else {
-        panic!("{file:?}");
-    };
-    let shown = "unit 1 point 0x0010 to unit 2 point 0x0010";
-    assert_eq!(wire.to_string(), shown);
-    assert_eq!((wire.within.as_millis(), wire.pulses), (50, 100));
-    assert!(wire.inverted);
-    let analog = file.analog()[0];
-    assert_eq!((analog.tolerance, analog.from.unit), (40, 3));
-}
-
-#[test]
 fn examples_in_the_manual_are_read() {
-    let manual = include_str!("../../../../docs/hil.md");
+    let manual = include_str!("../../../../../docs/hil.md");
     let examples: Vec<BenchFile> = manual
         .split("```toml\n")
         .skip(1)
@@ -37,8 +13,21 @@ fn examples_in_the_manual_are_read() {
     let [bench, wires] = &examples[..] else {
         panic!("{} examples", examples.len());
     };
-    assert_eq!((bench.module, wires.wires().len()), (Some(Module::Do4), 1));
-    assert_eq!(wires.analog().len(), 1);
+    assert_eq!((bench.unit, bench.baud), (Some(1), Some(9600)));
+    assert_eq!(bench.module, Some(Module::Do4));
+    assert_eq!(bench.probe.as_deref(), Some("0483:3748"));
+    let [wire, analog] = wires.wires[..] else {
+        panic!("{wires:?}");
+    };
+    let shown = "unit 1 point 0x0010 to unit 2 point 0x0010";
+    assert_eq!(wire.to_string(), shown);
+    let carries = Carries::Bit {
+        inverted: true,
+        pulses: 100,
+    };
+    assert_eq!((wire.within.as_millis(), wire.carries), (50, carries));
+    let carries = Carries::Word { tolerance: 40 };
+    assert_eq!((analog.carries, analog.from.unit), (carries, 3));
 }
 
 #[test]
@@ -46,12 +35,15 @@ fn keys_that_are_left_out_have_their_defaults_and_the_unit_is_that_of_the_comman
     let text = "unit = 8\n[[wire]]\nfrom = { point = 0x10 }\nto = { unit = 2, point = 17 }\n\
                 [[analog]]\nfrom = { point = 18 }\nto = { point = 17 }\ntolerance = 1\n";
     let file = BenchFile::parse(text, None).unwrap();
-    assert_eq!(file.wires()[0].from.unit, 8);
+    assert_eq!(file.wires[0].from.unit, 8);
     let file = BenchFile::parse(text, Some(9)).unwrap();
-    let (wire, analog) = (file.wires()[0], file.analog()[0]);
+    let (wire, analog) = (file.wires[0], file.wires[1]);
     assert_eq!((wire.from.unit, analog.to.unit), (9, 9));
-    let others = (wire.within, wire.inverted, wire.pulses);
-    assert_eq!(others, (usual(), false, 0));
+    let carries = Carries::Bit {
+        inverted: false,
+        pulses: 0,
+    };
+    assert_eq!((wire.within, wire.carries), (usual(), carries));
     assert_eq!(analog.within, filtered());
     assert_eq!(BenchFile::parse("", None), Ok(BenchFile::default()));
 }
