@@ -17,7 +17,7 @@ use conformance::hil::shell;
 use conformance::interrupt;
 use conformance::probe::{Given, probe};
 use conformance::report::{Report, Totals, json, junit, table};
-use conformance::run::run_until;
+use conformance::run::{Verdict, run_until};
 use conformance::target::{Support, Target};
 
 fn main() -> ExitCode {
@@ -117,6 +117,11 @@ fn test(cli: Cli) -> anyhow::Result<u8> {
     report.interrupted = stop.load(Ordering::Relaxed);
     // The results up to an error are reported, too.
     say(table::summary(&report.outcomes));
+    for outcome in &report.outcomes {
+        if matches!(outcome.verdict, Verdict::Failed(_)) {
+            say(format_args!("failed: {}", outcome.name));
+        }
+    }
     let written = cli
         .reports
         .write(&junit::document(&report), &json::value(&report));

@@ -151,6 +151,7 @@ fn faulty_server_gives_status_1_and_its_failure_is_printed() {
         "09 03 03 E8 00 7E",
         "exception 03 to function 03",
         "1 failed",
+        "failed: fc03/quantity-above-most",
     ] {
         assert!(out.contains(part), "{part}: {out}");
     }
