@@ -8,9 +8,8 @@ use anyhow::Result;
 use fs_err as fs;
 use register_map::board::MODIO_02;
 
-use crate::command;
-use crate::test;
 use crate::workspace::{ALL, SUITE, Workspace};
+use crate::{command, images};
 
 const PATCH: &str = "docs/adding-a-module.patch";
 
@@ -28,7 +27,7 @@ pub fn check(workspace: &mut Workspace) -> Result<()> {
     host.args(PACKAGES.map(|package| format!("--package={package}")));
     // Without the tests of the store, which take longest.
     command::run(host.args(["--lib", "--test=blocks"]))?;
-    let images = test::images(&mut copy, &[&MODIO_02])?;
+    let images = images::variables(&mut copy, &[&MODIO_02])?;
     let mut simulated = copy.cargo("test");
     simulated.args(ALL).args(["--features", SUITE]);
     simulated.args(["--test=suite", "--", "--include-ignored", TEST]);

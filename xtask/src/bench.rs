@@ -68,7 +68,7 @@ pub fn check(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
 
 fn measure(workspace: &mut Workspace, board: &'static Board) -> Result<Value> {
     let loader = build::loader(workspace, board)?;
-    let image = signed::image(workspace, &signed::Options::of(board), Slot::A)?;
+    let image = signed::image(workspace, board)?;
     let elf = build::image(workspace, board)?;
     let mut build = rivals(workspace, "build")?;
     let rivals = workspace::artifacts(build.arg("--quiet"))?;

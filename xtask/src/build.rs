@@ -1,5 +1,5 @@
-//! `cargo xtask build`: the loader, the application for both slots behind it, the file of an update, and the image that
-//! runs without a loader. Each is an ELF file for a debugger or the simulator, and a .bin for a programmer.
+//! Builds the programs of a board: the loader, the application for a slot behind it, and the application that runs without
+//! a loader. Each is an ELF file for a debugger or the simulator, and a .bin for a programmer.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ use register_map::update::Slot;
 use crate::error::usage;
 use crate::toolchain::TARGET;
 use crate::workspace::{self, Workspace};
-use crate::{image, keys, signed};
+use crate::{image, keys};
 
 /// The profile of the root Cargo.toml that the image is built with.
 pub const PROFILE: &str = "firmware";
@@ -79,25 +79,6 @@ pub struct Built {
     pub elf: PathBuf,
     /// The packages that were compiled for the target.
     pub packages: Vec<PackageId>,
-}
-
-/// `cargo xtask build`.
-pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
-    for file in all(workspace, options.board)? {
-        say!("{}", file.display());
-    }
-    Ok(())
-}
-
-/// Builds every program of a board, and returns the files: the loader, the application for both slots, the file of an
-/// update that has them, signed with the development key, and the image that runs alone.
-pub fn all(workspace: &mut Workspace, board: &'static Board) -> Result<Vec<PathBuf>> {
-    let loader = loader(workspace, board)?;
-    let ([a, b], update) = signed::update(workspace, &signed::Options::of(board))?;
-    let slots = [a, b].map(|image| image.with_extension(""));
-    let alone = image(workspace, board)?;
-    let bin = alone.with_extension("bin");
-    Ok([vec![loader], slots.into(), vec![update, alone, bin]].concat())
 }
 
 /// Builds the image that runs without a loader, and returns its ELF file.

@@ -173,16 +173,15 @@ impl Options {
             return Ok((vec![(FLASH_BASE, bytes)], entry));
         }
         // Before the builds, which take long.
-        self.signature.key(workspace)?;
-        if keys::Pair::of(workspace)?.has_development() {
+        let signer = self.signature.signer(workspace)?;
+        if signer.trusted.has_development() {
             eprintln!(
                 "xtask: this unit takes firmware from anybody on its line, because everybody has the development keys; \
                  docs/update.md says how to make your own"
             );
         }
         let (loader, entry) = flat(&build::loader(workspace, board)?)?;
-        let signed = signed::Options::signed(board, self.signature.clone());
-        let image = signed::image(workspace, &signed, self.slot)?;
+        let image = signed::image_by(workspace, board, self.slot, &signer)?;
         Ok((loaded(board, self.slot, loader, fs::read(image)?), entry))
     }
 

@@ -35,13 +35,16 @@ mod fuzz;
 mod group;
 mod hex;
 mod image;
+mod images;
 mod keys;
+mod lint;
 mod ordinary;
 mod peers;
 mod python;
 mod renode;
 mod signed;
 mod sim;
+mod simulated;
 mod size;
 mod soak;
 mod sources;
@@ -146,7 +149,7 @@ fn run(cli: Cli) -> Result<()> {
     let mut workspace = Workspace::open()?;
     let workspace = &mut workspace;
     match cli.command {
-        Command::Build(options) => build::run(workspace, &options),
+        Command::Build(options) => images::run(workspace, &options),
         Command::Image(options) => signed::run(workspace, &options),
         Command::Sign(options) => signed::again(workspace, &options),
         Command::Keygen(new) => keys::run(workspace, &new),

@@ -10,7 +10,7 @@ use register_map::board::{FX3U_14, FX3U_24, MODIO_02, MODIO_08};
 
 use crate::error::missing;
 use crate::workspace::Workspace;
-use crate::{command, ordinary, test};
+use crate::{command, images, ordinary};
 
 /// The file that pins pymodbus and its serial port.
 pub const PYMODBUS: &str = "tools/sim/tests/pymodbus/requirements.txt";
@@ -139,7 +139,7 @@ fn script(
         }
     };
     script.arg(workspace.root.join(name));
-    script.envs(test::images(workspace, boards)?);
+    script.envs(images::variables(workspace, boards)?);
     script.env("MODIO_SIM", workspace.simulator()?);
     script.current_dir(&workspace.root);
     Ok(script)

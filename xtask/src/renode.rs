@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use fs_err as fs;
-use register_map::update::Slot;
+use register_map::board::{MODIO_02, MODIO_08};
 use register_map::{Board, Module};
 use serde_json::json;
 
@@ -25,6 +25,9 @@ mod suites;
 mod tests;
 
 use find::Renode;
+
+/// The boards that Renode and the bench have.
+pub const MODIO: [&Board; 2] = [&MODIO_02, &MODIO_08];
 
 /// The platform, the scripts and the suites, relative to the root.
 const DIRECTORY: &str = "renode";
@@ -94,7 +97,7 @@ impl Options {
         }
         let board = self.given.board();
         let loader = build::loader(workspace, board)?;
-        let image = signed::image(workspace, &signed::Options::of(board), Slot::A)?;
+        let image = signed::image(workspace, board)?;
         Ok((loader, Some(image)))
     }
 }

@@ -1,6 +1,6 @@
 //! `cargo xtask image` and `sign`: the file of an update, with the signed images for both slots.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, anyhow, ensure};
 use ed25519_dalek::{Signature, Signer as _, SigningKey, VerifyingKey};
@@ -52,12 +52,26 @@ pub struct How {
     epoch: Option<u16>,
 }
 
+/// What signs images, and the epoch that they get.
+pub struct Signer {
+    key: SigningKey,
+    epoch: Option<u16>,
+    /// The keys that the loader trusts.
+    pub trusted: keys::Pair,
+}
+
 impl How {
-    /// Returns the private key. One by which the loader of this workspace would not start an image is refused.
-    pub fn key(&self, workspace: &Workspace) -> Result<SigningKey> {
+    /// Reads the keys. A private key by which the loader of this workspace would not start an image is refused.
+    pub fn signer(&self, workspace: &Workspace) -> Result<Signer> {
         let key = keys::read(workspace, self.key.as_deref())?;
-        keys::Pair::of(workspace)?.check(&key.verifying_key(), self.end_first_key)?;
-        Ok(key)
+        let trusted = keys::Pair::of(workspace)?;
+        trusted.check(&key.verifying_key(), self.end_first_key)?;
+        let epoch = self.epoch;
+        Ok(Signer {
+            key,
+            epoch,
+            trusted,
+        })
     }
 }
 
@@ -88,33 +102,17 @@ pub struct Again {
     output: Option<PathBuf>,
 }
 
-impl Options {
-    /// Returns the options for a board, with the development key.
-    pub fn of(board: &'static Board) -> Self {
-        Self::signed(board, How::default())
-    }
-
-    /// Returns the options for a board, with this key and epoch.
-    pub fn signed(board: &'static Board, signature: How) -> Self {
-        Self {
-            build: build::Options { board },
-            signature,
-            keys: keys::Trusted::default(),
-            output: None,
-        }
-    }
-}
-
 /// `cargo xtask image`.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     options.keys.apply(workspace)?;
-    let key = options.signature.key(workspace)?;
-    if keys::is_development(&key.verifying_key()) {
+    let signer = options.signature.signer(workspace)?;
+    if keys::is_development(&signer.key.verifying_key()) {
         eprintln!(
             "xtask: signed with a development key, which everybody has; --keys and --key name your own (docs/update.md, Keys)"
         );
     }
-    let (_, file) = update(workspace, options)?;
+    let output = options.output.as_deref();
+    let (_, file) = update_by(workspace, options.build.board, &signer, output)?;
     say!("{}", file.display());
     Ok(())
 }
@@ -127,7 +125,7 @@ pub fn again(workspace: &mut Workspace, options: &Again) -> Result<()> {
         end_first_key: options.end_first_key,
         epoch: options.epoch,
     };
-    let key = how.key(workspace)?;
+    let key = how.signer(workspace)?.key;
     let path = &options.file;
     let bytes = fs::read(path).map_err(|error| usage(error.to_string()))?;
     let mut images = images(&bytes).map_err(|why| usage(format!("{}: {why:#}", path.display())))?;
@@ -151,28 +149,46 @@ pub fn again(workspace: &mut Workspace, options: &Again) -> Result<()> {
     Ok(())
 }
 
-/// Builds and signs the images for both slots, and makes the file of an update. Returns the files of the images, A
-/// first, and that file.
-pub fn update(workspace: &mut Workspace, options: &Options) -> Result<([PathBuf; 2], PathBuf)> {
-    let mut image = |slot| image(workspace, options, slot);
+/// Builds the images for both slots, signs them with the development key, and makes the file of an update. Returns the
+/// files of the images, A first, and that file.
+pub fn update(workspace: &mut Workspace, board: &Board) -> Result<([PathBuf; 2], PathBuf)> {
+    let signer = How::default().signer(workspace)?;
+    update_by(workspace, board, &signer, None)
+}
+
+fn update_by(
+    workspace: &mut Workspace,
+    board: &Board,
+    signer: &Signer,
+    output: Option<&Path>,
+) -> Result<([PathBuf; 2], PathBuf)> {
+    let mut image = |slot| image_by(workspace, board, slot, signer);
     let slots = [image(Slot::A)?, image(Slot::B)?];
     let [a, b] = &slots;
-    let board = options.build.board;
     let beside = || a.with_file_name(format!("{board}.modio"));
-    let output = options.output.clone().unwrap_or_else(beside);
+    let output = output.map_or_else(beside, Path::to_owned);
     fs::write(&output, file(&[fs::read(a)?, fs::read(b)?]))?;
     Ok((slots, output))
 }
 
+/// Builds the image for slot A, signs it with the development key, and returns its file.
+pub fn image(workspace: &mut Workspace, board: &Board) -> Result<PathBuf> {
+    let signer = How::default().signer(workspace)?;
+    image_by(workspace, board, Slot::A, &signer)
+}
+
 /// Builds the image for a slot, signs it, and returns its file.
-pub fn image(workspace: &mut Workspace, options: &Options, slot: Slot) -> Result<PathBuf> {
-    let board = options.build.board;
-    let key = options.signature.key(workspace)?;
+pub fn image_by(
+    workspace: &mut Workspace,
+    board: &Board,
+    slot: Slot,
+    signer: &Signer,
+) -> Result<PathBuf> {
     let elf = build::program(workspace, board, Program::Slot(slot), None)?.elf;
     let mut sources = workspace.sources()?;
-    sources.epoch = options.signature.epoch.unwrap_or(sources.epoch);
+    sources.epoch = signer.epoch.unwrap_or(sources.epoch);
     let mut image = unsigned(board, slot, &image::read(&elf)?, &sources)?;
-    sign(&mut image, &key);
+    sign(&mut image, &signer.key);
     let file = elf.with_extension("image");
     fs::write(&file, image)?;
     Ok(file)
@@ -245,18 +261,19 @@ pub fn put_signature<'a>(
     let made_it = |key: &&VerifyingKey| key.verify_strict(signed_part(image), &parsed).is_ok();
     let key = public.iter().find(made_it);
     let key = key.context("the signature is not of this image by one of the public keys")?;
-    let number = keys::first_bytes(key.as_bytes());
-    image[92..156].copy_from_slice(signature);
-    image[156..160].copy_from_slice(&number);
+    write_signature(image, &parsed, key);
     Ok(key)
+}
+
+fn write_signature(image: &mut [u8], signature: &Signature, by: &VerifyingKey) {
+    image[92..156].copy_from_slice(&signature.to_bytes());
+    image[156..160].copy_from_slice(&keys::first_bytes(by.as_bytes()));
 }
 
 /// Gives an image its signature.
 pub fn sign(image: &mut [u8], key: &SigningKey) {
-    let signature = key.sign(signed_part(image)).to_bytes();
-    image[92..156].copy_from_slice(&signature);
-    let name = keys::first_bytes(key.verifying_key().as_bytes());
-    image[156..160].copy_from_slice(&name);
+    let signature = key.sign(signed_part(image));
+    write_signature(image, &signature, &key.verifying_key());
 }
 
 /// Returns the file of an update: both images, each padded to 128 bytes, and the manifest.

@@ -5,7 +5,7 @@ use std::ffi::OsString;
 use std::process::Command;
 
 use anyhow::Result;
-use register_map::{Board, update::Slot};
+use register_map::Board;
 
 use crate::workspace::Workspace;
 use crate::{build, command, signed};
@@ -21,7 +21,7 @@ pub fn run(workspace: &mut Workspace, arguments: &[OsString]) -> Result<()> {
     for (kind, board) in lines.lines().filter_map(missing_file) {
         let file = match kind {
             "loader" => build::loader(workspace, board)?,
-            "image" => signed::image(workspace, &signed::Options::of(board), Slot::A)?,
+            "image" => signed::image(workspace, board)?,
             _ => build::image(workspace, board)?,
         };
         simulator.arg(format!("--{kind}={board}={}", file.display()));

@@ -9,7 +9,7 @@ use register_map::board::MODIO_02;
 
 use crate::error::usage;
 use crate::workspace::Workspace;
-use crate::{build, test};
+use crate::{build, simulated};
 
 /// The options of a test run with one test, which shows its progress.
 const ONE_TEST: &str = "--nocapture --exact";
@@ -45,9 +45,9 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     let name = format!("{ONE_TEST} {name}");
     let variables = [
         (variable, &*length.to_string()),
-        (test::CORNER, &options.corner),
+        (simulated::CORNER, &options.corner),
     ];
-    test::simulated(
+    simulated::run(
         workspace,
         &[&MODIO_02],
         "--quiet --test=image",
@@ -89,7 +89,7 @@ pub fn matrix(workspace: &mut Workspace, options: &Matrix) -> Result<()> {
     }
     let name = format!("{ONE_TEST} matrix::every_rate_and_format_conforms");
     let every_case = [("MODIO_MATRIX", &*format!("{board} {turn}"))];
-    test::simulated(
+    simulated::run(
         workspace,
         &[board],
         "--quiet --test=suite",

@@ -2,39 +2,22 @@
 //! documentation with every warning an error, and steps that take longer.
 
 use std::env;
-use std::path::PathBuf;
-use std::process::{Command, Stdio};
 use std::thread;
 
 use In::{Ci, Host, Test};
-use Run::{Each, EachOfModio, Once};
-use anyhow::{Result, bail, ensure};
+use Run::{Each, EachOfModio, EachPart, Once};
+use anyhow::{Result, ensure};
 use register_map::Board;
 use register_map::board::{FX3U_24, MODIO_02, MODIO_08};
 
 use crate::error::{missing, usage};
 use crate::python::{console, masters, page};
-use crate::renode::checks;
+use crate::renode::{MODIO, checks};
 use crate::steps::{self, Done};
 use crate::workspace::{ALL, SUITE, Workspace};
-use crate::{adding, bench, build, command, fuzz, group, ordinary, peers, signed, size, table};
-
-/// The variable with the corner of the part for the tests of the image.
-pub const CORNER: &str = "MODIO_CORNER";
-
-/// The programs for the microcontroller, each with its packages. They need different features of board-support.
-const PROGRAMS: [(&str, &str); 2] = [
-    (
-        "firmware",
-        "firmware board-support boot-state modio-drivers ports modbus-server register-map",
-    ),
-    (
-        "loader",
-        "loader board-support boot-state ports register-map",
-    ),
-];
-
-const WORKSPACES: [&str; 3] = ["Cargo.toml", fuzz::MANIFEST, peers::MANIFEST];
+use crate::{
+    adding, bench, build, command, fuzz, group, images, lint, peers, simulated, size, table,
+};
 
 /// The tests of the images that run at the corners: those whose result depends on the clocks, on the time of
 /// instructions and of the flash, or on the converter.
@@ -57,24 +40,35 @@ enum In {
 /// The function of a step: for the project, or for each board.
 enum Run {
     Once(fn(&mut Workspace) -> Result<()>),
-    Each(fn(&mut Workspace, &'static Board) -> Result<()>),
+    Each(OfBoard),
     /// For each of [`MODIO`].
-    EachOfModio(fn(&mut Workspace, &'static Board) -> Result<()>),
+    EachOfModio(OfBoard),
+    /// For the board of each of [`lint::PARTS`].
+    EachPart(OfBoard),
 }
 
-/// The boards that Renode and the bench have.
-pub const MODIO: [&Board; 2] = [&MODIO_02, &MODIO_08];
+type OfBoard = fn(&mut Workspace, &'static Board) -> Result<()>;
 
 /// The steps in the order in which they run: command, name, description, function. The names do not change. A step that
-/// runs for each board has the board's number or name at the end of its name, such as `lint-02` or `lint-eth-io5r`.
+/// runs for each board has the board's number or name at the end of its name, such as `image-02` or `image-eth-io5r`.
 const STEPS: [(In, &str, &str, Run); 23] = [
-    (Ci, "fmt", "formatting", Once(formatting)),
-    (Ci, "lint-host", "lints, host", Once(lint_host)),
-    (Ci, "lint", "lints, target", Each(lint_target)),
-    (Ci, "lint-fuzz", "lints, fuzz targets", Once(lint_fuzz)),
-    (Ci, "lint-peers", "lints, peers", Once(lint_peers)),
-    (Ci, "doc-host", "documentation, host", Once(doc_host)),
-    (Ci, "doc", "documentation, target", Each(doc_target)),
+    (Ci, "fmt", "formatting", Once(lint::formatting)),
+    (Ci, "lint-host", "lints, host", Once(lint::host)),
+    (Ci, "lint", "lints, target", EachPart(lint::target)),
+    (
+        Ci,
+        "lint-fuzz",
+        "lints, fuzz targets",
+        Once(lint::fuzz_targets),
+    ),
+    (Ci, "lint-peers", "lints, peers", Once(lint::peers)),
+    (Ci, "doc-host", "documentation, host", Once(lint::doc_host)),
+    (
+        Ci,
+        "doc",
+        "documentation, target",
+        EachPart(lint::doc_target),
+    ),
     (Host, "unit", "tests on the host", Once(unit)),
     (Host, "image", "release images, no panics", Each(image)),
     (Host, "size", "size of the image", Each(size::check)),
@@ -85,8 +79,18 @@ const STEPS: [(In, &str, &str, Run); 23] = [
     (Test, "page", "the simulator's page", Once(page)),
     (Test, "console", "commands in the documents", Once(console)),
     (Test, "renode", "files for Renode", Once(checks::files)),
-    (Ci, "sim-slow", "sim, slow corner", Once(sim_slow)),
-    (Ci, "sim-fast", "sim, fast corner", Once(sim_fast)),
+    (
+        Ci,
+        "sim-slow",
+        "sim, slow corner",
+        Once(|workspace| sim_at(workspace, "slow")),
+    ),
+    (
+        Ci,
+        "sim-fast",
+        "sim, fast corner",
+        Once(|workspace| sim_at(workspace, "fast")),
+    ),
     (
         Ci,
         "bench",
@@ -136,20 +140,26 @@ type Step = (In, String, String, Box<Function>);
 type Function = dyn Fn(&mut Workspace) -> Result<()>;
 
 fn all() -> Vec<Step> {
+    let short = |board: &'static Board| (board.name.trim_start_matches("modio-"), board);
     let mut all: Vec<Step> = Vec::new();
     for (part_of, name, what, run) in STEPS {
-        let (run, boards): (_, &[&'static Board]) = match run {
+        let (run, boards) = match run {
             Once(run) => {
                 all.push((part_of, name.to_owned(), what.to_owned(), Box::new(run)));
                 continue;
             }
-            Each(run) => (run, &Board::ALL),
-            EachOfModio(run) => (run, &MODIO),
+            Each(run) => (run, Board::ALL.map(short).to_vec()),
+            EachOfModio(run) => (run, MODIO.map(short).to_vec()),
+            EachPart(run) => (run, lint::PARTS.to_vec()),
         };
-        for board in boards {
-            let name = format!("{name}-{}", board.name.trim_start_matches("modio-"));
+        for (of, board) in boards {
             let run = Box::new(move |workspace: &mut Workspace| run(workspace, board));
-            all.push((part_of, name, format!("{what}, {board}"), run));
+            all.push((
+                part_of,
+                format!("{name}-{of}"),
+                format!("{what}, {board}"),
+                run,
+            ));
         }
     }
     all
@@ -208,6 +218,7 @@ impl Chosen {
     }
 }
 
+<<<<<<< HEAD
 fn formatting(workspace: &mut Workspace) -> Result<()> {
     // Check all workspaces, even when one fails.
     let checked = WORKSPACES.map(|manifest| {
@@ -286,6 +297,8 @@ fn doc_target(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
     Ok(())
 }
 
+=======
+>>>>>>> f20ea9ed (xtask: lints and documentation for the target once for each part; no circles between modules; keys are read once)
 fn unit(workspace: &mut Workspace) -> Result<()> {
     let mut cargo = workspace.cargo("test");
     if workspace.host {
@@ -297,7 +310,7 @@ fn unit(workspace: &mut Workspace) -> Result<()> {
 }
 
 fn image(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
-    build::all(workspace, board).map(drop)
+    images::all(workspace, board).map(drop)
 }
 
 fn sim(workspace: &mut Workspace) -> Result<()> {
@@ -305,11 +318,16 @@ fn sim(workspace: &mut Workspace) -> Result<()> {
     // The image that runs alone, which is beside the others.
     build::image(workspace, &MODIO_02)?;
     let boards = [&MODIO_02, &MODIO_08, &FX3U_24];
-    simulated(workspace, &boards, tests, "", &[])
+    simulated::run(workspace, &boards, tests, "", &[])
 }
 
 fn suite(workspace: &mut Workspace) -> Result<()> {
+<<<<<<< HEAD
     simulated(workspace, &Board::ALL, "--test=suite", "", &[])
+=======
+    let tests = "--test=suite --test=hil --test=hil_simulator";
+    simulated::run(workspace, &Board::ALL, tests, "", &[])
+>>>>>>> f20ea9ed (xtask: lints and documentation for the target once for each part; no circles between modules; keys are read once)
 }
 
 fn tool(workspace: &mut Workspace) -> Result<()> {
@@ -317,7 +335,7 @@ fn tool(workspace: &mut Workspace) -> Result<()> {
     let threads = thread::available_parallelism().map_or(2, |cores| cores.get() + 1);
     let threads = format!("--test-threads={threads}");
     let boards = [&MODIO_02, &MODIO_08];
-    simulated(workspace, &boards, "--test=simulator", &threads, &[])?;
+    simulated::run(workspace, &boards, "--test=simulator", &threads, &[])?;
     ensure!(
         which::which("node").is_ok(),
         missing(
@@ -329,88 +347,16 @@ fn tool(workspace: &mut Workspace) -> Result<()> {
     command::run(cargo.args(["--test=node_red", "--", "--include-ignored"]))
 }
 
-fn sim_slow(workspace: &mut Workspace) -> Result<()> {
-    sim_at(workspace, "slow")
-}
-
-fn sim_fast(workspace: &mut Workspace) -> Result<()> {
-    sim_at(workspace, "fast")
-}
-
 fn sim_at(workspace: &mut Workspace, corner: &str) -> Result<()> {
-    let corner = [(CORNER, corner)];
+    let corner = [(simulated::CORNER, corner)];
     for (board, test, names) in [
         (&MODIO_02, "--test=image", AT_CORNERS),
         (&MODIO_08, "--test=image_08", AT_CORNERS_08),
         (&FX3U_24, "--test=image_fx3u", ""),
     ] {
-        simulated(workspace, &[board], test, names, &corner)?;
+        simulated::run(workspace, &[board], test, names, &corner)?;
     }
     Ok(())
-}
-
-/// Builds the loader of these boards, and the signed images for both slots. Returns for each board the variable with which
-/// tests find the directory of these files.
-pub fn images(
-    workspace: &mut Workspace,
-    boards: &[&'static Board],
-) -> Result<Vec<(String, PathBuf)>> {
-    let mut directories = Vec::new();
-    for board in boards {
-        let loader = build::loader(workspace, board)?;
-        signed::update(workspace, &signed::Options::of(board))?;
-        let name = board.name.to_uppercase().replace('-', "_");
-        directories.push((format!("MODIO_IMAGES_{name}"), loader.with_file_name("")));
-    }
-    Ok(directories)
-}
-
-/// Runs tests that run the loader and the images of these boards in the simulator, as an ordinary user: those of these
-/// targets whose names contain one of `names`, or all. Spaces separate targets and names. A name that begins with `--` is
-/// an option of the tests. The variables choose the corner of the part, and how long a test is.
-pub fn simulated(
-    workspace: &mut Workspace,
-    boards: &[&'static Board],
-    targets: &str,
-    names: &str,
-    variables: &[(&str, &str)],
-) -> Result<()> {
-    let ordinary = ordinary::words()?;
-    let images = images(workspace, boards)?;
-    let simulator = workspace.simulator()?;
-    let tests = |list: &[&str]| {
-        let mut cargo = workspace.cargo("test");
-        cargo.args(ALL).args(["--features", SUITE]);
-        if !ordinary.is_empty() {
-            let runner = format!("target.'cfg(unix)'.runner={ordinary:?}");
-            cargo.args(["--config", &runner]);
-        }
-        cargo.arg("--no-fail-fast").args(targets.split(' '));
-        cargo.args(["--", "--ignored"]).args(list);
-        cargo.args(names.split_whitespace());
-        cargo.env(CORNER, "nominal").envs(variables.iter().copied());
-        cargo.envs(images.iter().map(|(name, directory)| (name, directory)));
-        // Tests of one package do not know the path of another package's program.
-        cargo.env("MODIO_SIM", &simulator);
-        cargo
-    };
-    let wanted = names.split_whitespace();
-    let wanted: Vec<_> = wanted.filter(|word| !word.starts_with("--")).collect();
-    if !wanted.is_empty() {
-        // The messages of the compiler are shown.
-        let list = command::read(tests(&["--list"]).stderr(Stdio::inherit()))?;
-        all_match(&list, &wanted)?;
-    }
-    command::run(&mut tests(&[]))
-}
-
-/// Refuses a name that no test in this list of tests has, because a run of no test passes.
-fn all_match(list: &str, names: &[&str]) -> Result<()> {
-    let tests = || list.lines().filter_map(|line| line.strip_suffix(": test"));
-    let absent = names
-        .iter()
-        .find(|name| !tests().any(|test| test.contains(**name)));
-    absent.map_or(Ok(()), |name| bail!("no test has the name {name}"))
 }
 
 #[cfg(test)]
@@ -423,15 +369,6 @@ mod tests {
         let names: Vec<String> = names.iter().map(ToString::to_string).collect();
         let chosen = chosen(&names, command)?;
         Ok(chosen.into_iter().map(|step| step.1).collect())
-    }
-
-    #[test]
-    fn a_name_that_no_test_has_is_an_error() {
-        let list = "noise::soak: test\nslots::a_pulse: test\n\n2 tests, 0 benchmarks\n";
-        assert!(all_match(list, &["noise::soak", "slots::"]).is_ok());
-        let error = all_match(list, &["slots::", "long_run::"]).unwrap_err();
-        assert_eq!(error.to_string(), "no test has the name long_run::");
-        assert!(all_match("", &["tests"]).is_err());
     }
 
     #[test]

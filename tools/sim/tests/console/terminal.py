@@ -10,11 +10,10 @@ import sys
 import time
 
 import pages
-from simulator import images
+from simulator import IMAGES
 
 # Seconds of the wall clock within which a command must end, or a simulator be ready.
 PATIENCE = 120
-BOARDS = ("modio-02", "modio-08", "fx3u-14", "fx3u-24")
 # What a page says for a path or a port of the reader's computer.
 TEMPORARY = "/tmp/"
 SERIAL_PORT = "/dev/ttyUSB0"
@@ -50,9 +49,11 @@ class Terminal:
         programs = directory / "programs"
         programs.mkdir()
         simulator = [os.environ["MODIO_SIM"]]
-        for board in BOARDS:
-            simulator += ["--loader", f"{board}={images(board)}/loader"]
-            simulator += ["--image", f"{board}={images(board)}/modio-a.image"]
+        # Of the boards whose images the step has built.
+        for name in (name for name in os.environ if name.startswith(IMAGES)):
+            board = name.removeprefix(IMAGES).lower().replace("_", "-")
+            simulator += ["--loader", f"{board}={os.environ[name]}/loader"]
+            simulator += ["--image", f"{board}={os.environ[name]}/modio-a.image"]
         texts = {
             "cargo": CARGO.format(simulator=shlex.join(simulator)),
             "modioctl": MODIOCTL.format(modioctl=shlex.quote(os.environ["MODIOCTL"])),

@@ -20,13 +20,15 @@ PATIENCE = 60.0
 SILENCE_MS = 500
 # Seconds after which a master without a reply gives up, in tests that expect no reply.
 GIVE_UP = 0.5
+# The beginning of the variables that name the images of a board.
+IMAGES = "MODIO_IMAGES_"
 # The beginning of a warning of the simulator that says nothing about the unit.
 TOO_SLOW = "modio-sim: warning: this computer has run the boards at"
 
 
 def images(board: str = "modio-02") -> pathlib.Path:
     """Returns the directory with the loader and the images of a board. `cargo xtask test` sets the variables."""
-    return pathlib.Path(os.environ["MODIO_IMAGES_" + board.upper().replace("-", "_")])
+    return pathlib.Path(os.environ[IMAGES + board.upper().replace("-", "_")])
 
 
 def firmware(board: str = "modio-02") -> list[str]:
