@@ -30,10 +30,6 @@ def send_key_to_uart(c, testerId: int = None):
     """Sends a byte."""
 
 
-def write_char_delay(delay: float, testerId: int = None):
-    """Sets the time between two bytes."""
-
-
 def wait_for_bytes_on_uart(content, timeout: float = None, testerId: int = None, treatAsRegex: bool = False,
                            pauseEmulation: bool = None, matchStart: bool = False):
     """Waits for bytes."""

@@ -19,22 +19,9 @@ def frame(unit, pdu):
     return (data + _crc(data)).hex(" ").upper()
 
 
-def damaged(frame_hex):
-    """Returns the frame with one bit of its CRC inverted."""
-    data = bytearray.fromhex(frame_hex)
-    data[-1] ^= 0x01
-    return data.hex(" ").upper()
-
-
 def keys(frame_hex):
     """Returns a frame's bytes in the format of `Send Key To Uart`."""
     return [f"0x{byte:02X}" for byte in bytes.fromhex(frame_hex)]
-
-
-def part(frame_hex, begin, end=None):
-    """Returns the bytes of a frame from one index up to another, in hexadecimal."""
-    data = bytes.fromhex(frame_hex)
-    return data[int(begin) : None if end is None else int(end)].hex(" ").upper()
 
 
 def seconds_for(frame_hex, rest="0.1"):

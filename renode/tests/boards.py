@@ -20,13 +20,11 @@ def get_variables(board):
         "BOARD_CODE": word(code),
         "PORT": port,
         "P": word(point)[:3],
-        "AFTER": word(point + 4),
         # Registers of the first slot: its module as set and in force, and the module's state.
         "MODULE": word(0x0110 + port - 1),
         "IN_FORCE": word(0x0210 + port - 1),
         "MODULE_STATE": word(0x0218 + port - 1),
-        # SAFE of its first point, and the pulses of its second.
-        "SAFE": word(0x01C0 + point),
+        # The pulses of its second point.
         "PULSES_2": word(0x0300 + 2 * (point + 1)),
         "SAVES": saves,
         "SAVES_WORD": word(saves),

@@ -96,38 +96,3 @@ Resource            modio.resource
     # Its outputs are channels C and D.
     DAC Output Should Be    2    0x0321
     DAC Output Should Be    3    0x0ABC
-
-An Empty Slot Has No Points
-    Start Board    none
-    Request Gives    01 ${P}0 0001    81 02
-    Request Gives    03 ${P}0 0001    83 02
-
-A Write Is Executed Completely Or Not At All
-    Start Board    4ao
-    Request Is Echoed    06 ${P}0 0111
-    # 4096 is above the DAC's range.
-    Request Gives    10 ${P}0 0002 04 0222 1000    90 03
-    Request Gives    03 ${P}0 0002    03 04 0111 0000
-
-The Longest Frames Are Accepted
-    Start Board    4do
-    # 123 registers, more than exist.
-    ${zeros}=    Evaluate    "0000" * 123
-    Request Gives    10 0200 007B F6 ${zeros}    90 02
-    Request Gives    03 0200 007D    83 02
-    Unit Answers
-
-
-*** Keywords ***
-Channel Converts To
-    [Documentation]    Sets the code of an analog line, counted from 0.
-    [Arguments]    ${channel}    ${code}
-    ${address}=    Evaluate    hex(int($ADC_CODES, 0) + 4 * int($channel))
-    Execute Command    sysbus WriteDoubleWord ${address} ${code}
-
-DAC Output Should Be
-    [Documentation]    Checks the code at an output of the MCP4728, counted from 0.
-    [Arguments]    ${channel}    ${code}
-    ${address}=    Evaluate    hex(int($DAC_CODES, 0) + 4 * int($channel))
-    ${value}=    Read Word    ${address}
-    Should Be Equal As Integers    ${value}    ${code}

@@ -23,7 +23,7 @@ Four Modules Answer At Their Own Addresses
     Pin Should Be    ${ODR_A}    4    1
     Pin Should Be    ${ODR_A}    5    0
     Pin Should Be    ${ODR_A}    7    1
-    DAC Output Should Be    4    3    0x0FFF
+    DAC Output Should Be    3    0x0FFF    slot=4
     # A span must not leave the slots with points of its kind.
     Request Gives    02 0000 0009    82 02
     Request Gives    0F 0003 0002 01 03    8F 02
@@ -48,9 +48,9 @@ Every Slot Has A DAC
         ${code}=    Evaluate    '%04X' % (0x111 * $port)
         Request Is Echoed    06 ${address} ${code}
         Run For    0.1
-        DAC Output Should Be    ${port}    0    0x${code}
+        DAC Output Should Be    0    0x${code}    slot=${port}
     END
-    DAC Output Should Be    1    0    0x111
+    DAC Output Should Be    0    0x111    slot=1
 
 Ports Without A Slot Accept No Module
     Start Board
@@ -66,18 +66,3 @@ The Switch Is Read From The Pins Of This Board
     Start Board    dip=165
     Unit Answers    165
     Request Gets Silence    03 0204 0001    1
-
-
-*** Keywords ***
-Channel Converts To
-    [Documentation]    Sets the code of one of the converter's channels.
-    [Arguments]    ${channel}    ${code}
-    ${address}=    Evaluate    hex(int($ADC_CODES, 0) + 4 * int($channel))
-    Execute Command    sysbus WriteDoubleWord ${address} ${code}
-
-DAC Output Should Be
-    [Documentation]    Checks the code at an output of a port's MCP4728, counted from 0.
-    [Arguments]    ${port}    ${channel}    ${code}
-    ${address}=    Evaluate    hex(int($DAC_CODES, 0) + 0x20 * (int($port) - 1) + 4 * int($channel))
-    ${value}=    Read Word    ${address}
-    Should Be Equal As Integers    ${value}    ${code}
