@@ -4,13 +4,15 @@
 //! New inputs are written to `target/fuzz`, and the committed corpus does not change.
 
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use anyhow::{Result, ensure};
 use fs_err as fs;
+use rayon::prelude::*;
 
-use crate::command;
 use crate::error::{missing, usage};
 use crate::workspace::Workspace;
+use crate::{command, group};
 
 /// The manifest of the fuzz targets, a separate workspace.
 pub const MANIFEST: &str = "fuzz/Cargo.toml";
@@ -60,7 +62,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<()> {
         return Err(usage(format!("there is no input {}", input.display())));
     }
     let input = std::path::absolute(input)?;
-    fuzz(workspace, &targets[0], &[input], "-runs=1")
+    command::run(&mut fuzz(workspace, &targets[0], &[input], "-runs=1"))
 }
 
 /// Runs every target for a short time.
@@ -76,30 +78,41 @@ fn targets(workspace: &Workspace) -> Result<Vec<String>> {
     Ok(names.lines().map(str::to_owned).collect())
 }
 
-/// Runs every target, even when another one has found a failure.
+/// Runs every target, even when another one has found a failure: one on each core, and shows the output of each at its end.
 fn session(workspace: &Workspace, targets: &[String], seconds: u32) -> Result<()> {
     let limit = format!("-max_total_time={seconds}");
-    let mut failed = Vec::new();
-    for target in targets {
+    command::run(&mut cargo_fuzz(workspace, "build"))?;
+    let run = |target: &String| -> Result<bool> {
+        group::not_interrupted()?;
         let new = workspace.target.join("fuzz/corpus").join(target);
         fs::create_dir_all(&new)?;
         // libFuzzer writes new inputs to the first directory only. The second one has the seeds.
         let corpus = [new, Path::new("fuzz/corpus").join(target)];
-        if let Err(error) = fuzz(workspace, target, &corpus, &limit) {
-            eprintln!("{error:#}");
-            failed.push(target.as_str());
-        }
-    }
+        let done = command::output(&mut fuzz(workspace, target, &corpus, &limit))?;
+        let text = [done.stdout, done.stderr].concat();
+        eprintln!("{target}:\n{}", String::from_utf8_lossy(&text));
+        Ok(done.status.success())
+    };
+    let passed: Vec<bool> = targets.par_iter().map(run).collect::<Result<_>>()?;
+    let failed = targets.iter().zip(passed).filter(|(_, passed)| !passed);
+    let failed: Vec<_> = failed.map(|(target, _)| target.as_str()).collect();
     let names = failed.join(", ");
     ensure!(failed.is_empty(), "failed, see above: {names}");
     Ok(())
 }
 
-fn fuzz(workspace: &Workspace, target: &str, inputs: &[PathBuf], limit: &str) -> Result<()> {
+fn cargo_fuzz(workspace: &Workspace, subcommand: &str) -> Command {
     let mut cargo = workspace.cargo("fuzz");
-    cargo.args(["run", "--sanitizer", "none", "--target-dir"]);
-    cargo.arg(workspace.target.join("fuzz")).arg(target);
-    cargo.args(inputs);
+    cargo.args([subcommand, "--sanitizer", "none", "--target-dir"]);
+    cargo.arg(workspace.target.join("fuzz"));
+    cargo
+}
+
+/// Returns a run of a target with these inputs.
+fn fuzz(workspace: &Workspace, target: &str, inputs: &[PathBuf], limit: &str) -> Command {
+    let mut cargo = cargo_fuzz(workspace, "run");
+    cargo.arg(target).args(inputs);
     cargo.args(["--", limit]).args(OPTIONS.split(' '));
-    command::run(cargo.env("RUST_BACKTRACE", "1"))
+    cargo.env("RUST_BACKTRACE", "1");
+    cargo
 }

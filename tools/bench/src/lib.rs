@@ -13,6 +13,7 @@ pub mod unit;
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
 use register_map::Board;
 use serde::Serialize;
 use sim::{Corner, Image};
@@ -59,6 +60,29 @@ pub fn measure(
     board: &Board,
     rivals: &[(String, Image)],
 ) -> Result<Report, String> {
+    // Each case has a part of its own, so they run on all cores of the host.
+    let corners = [Corner::Nominal, Corner::Slow].into_iter();
+    let cases = corners.flat_map(|corner| RATES.map(|rate| (corner, rate)));
+    let cases: Vec<_> = cases
+        .flat_map(|(corner, rate)| [(corner, rate, false), (corner, rate, true)])
+        .collect();
+    let load = || {
+        let cases = cases.into_par_iter();
+        cases
+            .map(|(corner, rate, long)| load::measure(image, board, corner, rate, long))
+            .collect::<Result<_, String>>()
+    };
+    let requests = || self::requests(image, board, rivals);
+    let boot = || boot::measure(loader, signed, board);
+    let (requests, (load, boot)) = rayon::join(requests, || rayon::join(load, boot));
+    Ok(Report {
+        requests: requests?,
+        load: load?,
+        boot: boot?,
+    })
+}
+
+fn requests(image: &Image, board: &Board, rivals: &[(String, Image)]) -> Result<Vec<Row>, String> {
     let mut units: BTreeMap<(&str, u16), Unit> = BTreeMap::new();
     let mut rivals = rivals
         .iter()
@@ -93,18 +117,5 @@ pub fn measure(
             rivals: others,
         });
     }
-    let mut load = Vec::new();
-    for corner in [Corner::Nominal, Corner::Slow] {
-        for rate in RATES {
-            for long in [false, true] {
-                load.push(load::measure(image, board, corner, rate, long)?);
-            }
-        }
-    }
-    let boot = boot::measure(loader, signed, board)?;
-    Ok(Report {
-        requests,
-        load,
-        boot,
-    })
+    Ok(requests)
 }
