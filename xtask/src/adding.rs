@@ -3,6 +3,7 @@
 //! The page and this step use the same patch, so the page cannot be out of date.
 
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use anyhow::Result;
 use fs_err as fs;
@@ -22,7 +23,10 @@ const TEST: &str = "a_modio_02_conforms_with_every_module";
 /// Writes the generated documents and tests the changed packages, then runs the suite on the image with every module.
 pub fn check(workspace: &mut Workspace) -> Result<()> {
     let mut copy = patched(workspace)?;
-    command::run(copy.cargo("run").args(["--package", "xtask", "docs"]))?;
+    let mut docs = Command::new(copy.program("xtask")?);
+    // The variable of the cargo that runs this process names the project.
+    docs.env_remove("CARGO_MANIFEST_DIR");
+    command::run(docs.arg("docs").current_dir(&copy.root))?;
     let mut host = copy.cargo("test");
     host.args(PACKAGES.map(|package| format!("--package={package}")));
     // Without the tests of the store, which take longest.
@@ -53,7 +57,7 @@ fn patched(workspace: &Workspace) -> Result<Workspace> {
         manifest,
         text.replacen("\nversion = ", "\nversion = \"0.0.0\" # ", 1),
     )?;
-    let mut git = std::process::Command::new("git");
+    let mut git = Command::new("git");
     // The copy is in a directory that git ignores, so git must not look for the repository.
     git.env("GIT_CEILING_DIRECTORIES", workspace.root.join("target"));
     command::run(git.current_dir(&root).args(["apply", PATCH]))?;
@@ -66,7 +70,7 @@ fn patched(workspace: &Workspace) -> Result<Workspace> {
 /// Returns the files of the project that git knows or would add. Cargo finds the configuration in the directory above
 /// the copy; a second one would double its flags.
 fn files(root: &Path) -> Result<Vec<PathBuf>> {
-    let mut git = std::process::Command::new("git");
+    let mut git = Command::new("git");
     git.current_dir(root);
     let list =
         command::read(git.args("ls-files -z --cached --others --exclude-standard".split(' ')))?;

@@ -4,7 +4,7 @@
 use std::env;
 use std::thread;
 
-use In::{Ci, Host, Test};
+use In::{Ci, Host, Night, Test};
 use Run::{Each, EachOfModio, EachPart, Once};
 use anyhow::{Result, ensure};
 use register_map::Board;
@@ -19,12 +19,61 @@ use crate::{
     adding, bench, build, command, fuzz, group, images, lint, peers, simulated, size, table,
 };
 
-/// The tests of the images that run at the corners: those whose result depends on the clocks, on the time of
-/// instructions and of the flash, or on the converter.
-const AT_CORNERS: &str = "air::requests:: analog_inputs:: boot:: clock:: comm_watchdog:: counters:: dac_faults:: \
-    flash_faults:: hung_task:: in_force:: loading::the_ noise:: outputs_at_start:: points:: power_cut:: pulses:: saving:: \
-    silences:: timing:: updating::cuts:: updating::service:: updating::the_ upsets::a_reply";
-const AT_CORNERS_08: &str = "analog:: boot:: power_cut:: saving:: timing::";
+/// Tests of the images: the board, the target, and the beginnings of their names.
+type Tests = [(&'static Board, &'static str, &'static str); 3];
+
+/// Those whose result can depend on a corner: on the clocks, on the time of instructions and of the flash, or on the
+/// converter.
+const AT_CORNERS: Tests = [
+    (
+        &MODIO_02,
+        "--test=image",
+        "air::requests:: analog_inputs:: boot:: clock:: comm_watchdog:: counters:: dac_faults:: flash_faults:: \
+            hung_task:: in_force:: loading::the_ noise:: outputs_at_start:: points:: power_cut:: pulses:: saving:: \
+            silences:: timing:: updating::cuts:: updating::service:: updating::the_ upsets::a_reply",
+    ),
+    (
+        &MODIO_08,
+        "--test=image_08",
+        "analog:: boot:: power_cut:: saving:: timing::",
+    ),
+    (&FX3U_24, "--test=image_fx3u", ""),
+];
+
+/// Those for which instructions take longer: the times of starts, replies, saves and cuts, and the converter.
+const AT_SLOW: Tests = [
+    (
+        &MODIO_02,
+        "--test=image",
+        "air::requests:: analog_inputs:: boot:: clock:: flash_faults:: hung_task:: loading::the_ noise:: power_cut:: \
+            pulses:: saving:: silences:: timing:: updating::cuts:: updating::service::",
+    ),
+    (
+        &MODIO_08,
+        "--test=image_08",
+        "analog:: boot:: saving:: timing::",
+    ),
+    (
+        &FX3U_24,
+        "--test=image_fx3u",
+        "analog_ line_stays rs232::frames rs232::reply rs232::save scan_finds timing::",
+    ),
+];
+
+/// Those that depend on an oscillator or on the converter. The fast corner has the instructions of the nominal one.
+const AT_FAST: Tests = [
+    (
+        &MODIO_02,
+        "--test=image",
+        "analog_inputs:: boot:: clock:: hung_task:: loading::the_ timing::",
+    ),
+    (&MODIO_08, "--test=image_08", "analog:: boot:: timing::"),
+    (
+        &FX3U_24,
+        "--test=image_fx3u",
+        "analog_ line_stays rs232::reply timing::",
+    ),
+];
 
 /// Which command runs a step when no step is named.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -35,6 +84,8 @@ enum In {
     Test,
     /// `cargo xtask ci` only.
     Ci,
+    /// None: the workflow nightly.yml names it.
+    Night,
 }
 
 /// The function of a step: for the project, or for each board.
@@ -51,7 +102,7 @@ type OfBoard = fn(&mut Workspace, &'static Board) -> Result<()>;
 
 /// The steps in the order in which they run: command, name, description, function. The names do not change. A step that
 /// runs for each board has the board's number or name at the end of its name, such as `image-02` or `image-eth-io5r`.
-const STEPS: [(In, &str, &str, Run); 23] = [
+const STEPS: [(In, &str, &str, Run); 24] = [
     (Ci, "fmt", "formatting", Once(lint::formatting)),
     (Ci, "lint-host", "lints, host", Once(lint::host)),
     (Ci, "lint", "lints, target", EachPart(lint::target)),
@@ -83,13 +134,13 @@ const STEPS: [(In, &str, &str, Run); 23] = [
         Ci,
         "sim-slow",
         "sim, slow corner",
-        Once(|workspace| sim_at(workspace, "slow")),
+        Once(|workspace| sim_at(workspace, "slow", AT_SLOW)),
     ),
     (
         Ci,
         "sim-fast",
         "sim, fast corner",
-        Once(|workspace| sim_at(workspace, "fast")),
+        Once(|workspace| sim_at(workspace, "fast", AT_FAST)),
     ),
     (
         Ci,
@@ -105,6 +156,7 @@ const STEPS: [(In, &str, &str, Run); 23] = [
         Once(adding::check),
     ),
     (Ci, "fuzz", "fuzz targets, briefly", Once(fuzz::check)),
+    (Night, "corners", "sim, both corners", Once(corners)),
 ];
 
 /// The options of `cargo xtask test`.
@@ -199,6 +251,7 @@ impl Chosen {
                     Host => "test --host, test, ci",
                     Test => "test, ci",
                     Ci => "ci",
+                    Night => "the nightly workflow",
                 };
                 [name, part_of.to_owned(), what]
             });
@@ -335,28 +388,32 @@ fn tool(workspace: &mut Workspace) -> Result<()> {
     let threads = thread::available_parallelism().map_or(2, |cores| cores.get() + 1);
     let threads = format!("--test-threads={threads}");
     let boards = [&MODIO_02, &MODIO_08];
-    simulated::run(workspace, &boards, "--test=simulator", &threads, &[])?;
+    let has_node = which::which("node").is_ok();
+    let tests = match has_node {
+        true => "--test=simulator --test=node_red",
+        false => "--test=simulator",
+    };
+    simulated::run(workspace, &boards, tests, &threads, &[])?;
     ensure!(
-        which::which("node").is_ok(),
+        has_node,
         missing(
             "passed, but the functions of the Node-RED export were not run (on Debian: apt-get install nodejs)"
         )
     );
-    let mut cargo = workspace.cargo("test");
-    cargo.args(ALL).args(["--features", SUITE]);
-    command::run(cargo.args(["--test=node_red", "--", "--include-ignored"]))
+    Ok(())
 }
 
-fn sim_at(workspace: &mut Workspace, corner: &str) -> Result<()> {
+fn sim_at(workspace: &mut Workspace, corner: &str, tests: Tests) -> Result<()> {
     let corner = [(simulated::CORNER, corner)];
-    for (board, test, names) in [
-        (&MODIO_02, "--test=image", AT_CORNERS),
-        (&MODIO_08, "--test=image_08", AT_CORNERS_08),
-        (&FX3U_24, "--test=image_fx3u", ""),
-    ] {
+    for (board, test, names) in tests {
         simulated::run(workspace, &[board], test, names, &corner)?;
     }
     Ok(())
+}
+
+fn corners(workspace: &mut Workspace) -> Result<()> {
+    sim_at(workspace, "slow", AT_CORNERS)?;
+    sim_at(workspace, "fast", AT_CORNERS)
 }
 
 #[cfg(test)]
@@ -386,18 +443,15 @@ mod tests {
     }
 
     #[test]
-    fn workflow_runs_every_step_under_a_unique_name() {
-        let workflow = include_str!("../../.github/workflows/ci.yml");
-        let words: BTreeSet<&str> = workflow.split_whitespace().collect();
+    fn workflows_run_every_step_under_a_unique_name() {
+        let of_ci = include_str!("../../.github/workflows/ci.yml");
+        let nightly = include_str!("../../.github/workflows/nightly.yml");
         let mut seen = BTreeSet::new();
-        let mut missing = Vec::new();
-        for name in names(&[], Ci).unwrap() {
-            if !words.contains(name.as_str()) {
-                missing.push(name.clone());
-            }
+        for (part_of, name, ..) in all() {
+            let workflow = if part_of == Night { nightly } else { of_ci };
+            let mut words = workflow.split_whitespace();
+            assert!(words.any(|word| word == name), "no job runs {name}");
             assert!(seen.insert(name.clone()), "{name} is the name of two steps");
         }
-        let missing = missing.join(" ");
-        assert!(missing.is_empty(), "no job of ci.yml runs: {missing}");
     }
 }

@@ -60,7 +60,7 @@ pub fn measure(
     board: &Board,
     rivals: &[(String, Image)],
 ) -> Result<Report, String> {
-    // Each case has a part of its own, so they run on all cores of the host.
+    // Each case has another virtual part, so they can run on all cores of the host.
     let corners = [Corner::Nominal, Corner::Slow].into_iter();
     let cases = corners.flat_map(|corner| RATES.map(|rate| (corner, rate)));
     let cases: Vec<_> = cases
