@@ -55,7 +55,8 @@ fn for_target(
 ) -> Result<Command> {
     let mut cargo = workspace.target_cargo(subcommand)?;
     cargo.args(["--profile", build::PROFILE]);
-    cargo.args(["--features", &format!("{program}/{board}")]);
+    let features = format!("{program}/board,board-support/{board}");
+    cargo.args(["--features", &features]);
     Ok(cargo)
 }
 

@@ -271,87 +271,6 @@ impl Chosen {
     }
 }
 
-<<<<<<< HEAD
-fn formatting(workspace: &mut Workspace) -> Result<()> {
-    // Check all workspaces, even when one fails.
-    let checked = WORKSPACES.map(|manifest| {
-        let mut cargo = workspace.cargo("fmt");
-        command::run(cargo.args(["--all", "--check", "--manifest-path", manifest]))
-    });
-    checked.into_iter().collect()
-}
-
-fn deny_warnings(mut cargo: Command) -> Result<()> {
-    command::run(cargo.args(["--", "-Dwarnings"]))
-}
-
-fn lint_host(workspace: &mut Workspace) -> Result<()> {
-    let mut cargo = workspace.cargo("clippy");
-    cargo.args(ALL).arg("--all-targets");
-    deny_warnings(cargo)
-}
-
-/// Returns cargo with the options that compile a program for a board.
-fn for_target(
-    workspace: &mut Workspace,
-    subcommand: &str,
-    program: &str,
-    board: &Board,
-) -> Result<Command> {
-    let mut cargo = workspace.target_cargo(subcommand)?;
-    cargo.args(["--profile", build::PROFILE]);
-    cargo.args([
-        "--features",
-        &format!("{program}/board,board-support/{board}"),
-    ]);
-    Ok(cargo)
-}
-
-fn lint_target(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
-    for (program, packages) in PROGRAMS {
-        let mut cargo = for_target(workspace, "clippy", program, board)?;
-        for package in packages.split(' ') {
-            cargo.args(["--package", package]);
-        }
-        deny_warnings(cargo)?;
-    }
-    Ok(())
-}
-
-fn lint_fuzz(workspace: &mut Workspace) -> Result<()> {
-    deny_warnings(workspace.other("clippy", fuzz::MANIFEST, "fuzz"))
-}
-
-fn lint_peers(workspace: &mut Workspace) -> Result<()> {
-    deny_warnings(workspace.other("clippy", peers::MANIFEST, "peers"))?;
-    deny_warnings(bench::rivals(workspace, "clippy")?)
-}
-
-fn documentation(mut cargo: Command) -> Result<()> {
-    cargo.args(["--no-deps", "--document-private-items"]);
-    // Private items are documented too, so links to them are valid.
-    let flags = "-Dwarnings -Arustdoc::private-intra-doc-links";
-    command::run(cargo.env("RUSTDOCFLAGS", flags))
-}
-
-fn doc_host(workspace: &mut Workspace) -> Result<()> {
-    let mut cargo = workspace.cargo("doc");
-    // Most of board-support exists for the target only.
-    cargo.args(ALL).args(["--exclude", "board-support"]);
-    documentation(cargo)
-}
-
-fn doc_target(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
-    for (program, _) in PROGRAMS {
-        let mut cargo = for_target(workspace, "doc", program, board)?;
-        cargo.args(["--package", "board-support", "--package", program]);
-        documentation(cargo)?;
-    }
-    Ok(())
-}
-
-=======
->>>>>>> f20ea9ed (xtask: lints and documentation for the target once for each part; no circles between modules; keys are read once)
 fn unit(workspace: &mut Workspace) -> Result<()> {
     let mut cargo = workspace.cargo("test");
     if workspace.host {
@@ -375,12 +294,8 @@ fn sim(workspace: &mut Workspace) -> Result<()> {
 }
 
 fn suite(workspace: &mut Workspace) -> Result<()> {
-<<<<<<< HEAD
-    simulated(workspace, &Board::ALL, "--test=suite", "", &[])
-=======
     let tests = "--test=suite --test=hil --test=hil_simulator";
     simulated::run(workspace, &Board::ALL, tests, "", &[])
->>>>>>> f20ea9ed (xtask: lints and documentation for the target once for each part; no circles between modules; keys are read once)
 }
 
 fn tool(workspace: &mut Workspace) -> Result<()> {
