@@ -19,60 +19,39 @@ use crate::{
     adding, bench, build, command, fuzz, group, images, lint, peers, simulated, size, table,
 };
 
-/// Tests of the images: the board, the target, and the beginnings of their names.
-type Tests = [(&'static Board, &'static str, &'static str); 3];
+/// The tests of images that run at corners: of these boards, in these targets.
+const IMAGES: [(&Board, &str); 3] = [
+    (&MODIO_02, "--test=image"),
+    (&MODIO_08, "--test=image_08"),
+    (&FX3U_24, "--test=image_fx3u"),
+];
+
+/// Parts of the names of tests, for each of [`IMAGES`]; without any all tests.
+type Names = [&'static str; 3];
 
 /// Those whose result can depend on a corner: on the clocks, on the time of instructions and of the flash, or on the
 /// converter.
-const AT_CORNERS: Tests = [
-    (
-        &MODIO_02,
-        "--test=image",
-        "air::requests:: analog_inputs:: boot:: clock:: comm_watchdog:: counters:: dac_faults:: flash_faults:: \
-            hung_task:: in_force:: loading::the_ noise:: outputs_at_start:: points:: power_cut:: pulses:: saving:: \
-            silences:: timing:: updating::cuts:: updating::service:: updating::the_ upsets::a_reply",
-    ),
-    (
-        &MODIO_08,
-        "--test=image_08",
-        "analog:: boot:: power_cut:: saving:: timing::",
-    ),
-    (&FX3U_24, "--test=image_fx3u", ""),
+const AT_CORNERS: Names = [
+    "air::requests:: analog_inputs:: boot:: clock:: comm_watchdog:: counters:: dac_faults:: flash_faults:: hung_task:: \
+        in_force:: loading::the_ noise:: outputs_at_start:: points:: power_cut:: pulses:: saving:: silences:: timing:: \
+        updating::cuts:: updating::service:: updating::the_ upsets::a_reply",
+    "analog:: boot:: power_cut:: saving:: timing::",
+    "",
 ];
 
 /// Those for which instructions take longer: the times of starts, replies, saves and cuts, and the converter.
-const AT_SLOW: Tests = [
-    (
-        &MODIO_02,
-        "--test=image",
-        "air::requests:: analog_inputs:: boot:: clock:: flash_faults:: hung_task:: loading::the_ noise:: power_cut:: \
-            pulses:: saving:: silences:: timing:: updating::cuts:: updating::service::",
-    ),
-    (
-        &MODIO_08,
-        "--test=image_08",
-        "analog:: boot:: saving:: timing::",
-    ),
-    (
-        &FX3U_24,
-        "--test=image_fx3u",
-        "analog_ line_stays rs232::frames rs232::reply rs232::save scan_finds timing::",
-    ),
+const AT_SLOW: Names = [
+    "air::requests:: analog_inputs:: boot:: clock:: flash_faults:: hung_task:: loading::the_ noise:: power_cut:: \
+        pulses:: saving:: silences:: timing:: updating::cuts:: updating::service::",
+    "analog:: boot:: saving:: timing::",
+    "analog_ line_stays rs232::frames rs232::reply rs232::save scan_finds timing::",
 ];
 
 /// Those that depend on an oscillator or on the converter. The fast corner has the instructions of the nominal one.
-const AT_FAST: Tests = [
-    (
-        &MODIO_02,
-        "--test=image",
-        "analog_inputs:: boot:: clock:: hung_task:: loading::the_ timing::",
-    ),
-    (&MODIO_08, "--test=image_08", "analog:: boot:: timing::"),
-    (
-        &FX3U_24,
-        "--test=image_fx3u",
-        "analog_ line_stays rs232::reply timing::",
-    ),
+const AT_FAST: Names = [
+    "analog_inputs:: boot:: clock:: hung_task:: loading::the_ timing::",
+    "analog:: boot:: timing::",
+    "analog_ line_stays rs232::reply timing::",
 ];
 
 /// Which command runs a step when no step is named.
@@ -318,9 +297,9 @@ fn tool(workspace: &mut Workspace) -> Result<()> {
     Ok(())
 }
 
-fn sim_at(workspace: &mut Workspace, corner: &str, tests: Tests) -> Result<()> {
+fn sim_at(workspace: &mut Workspace, corner: &str, names: Names) -> Result<()> {
     let corner = [(simulated::CORNER, corner)];
-    for (board, test, names) in tests {
+    for ((board, test), names) in IMAGES.into_iter().zip(names) {
         simulated::run(workspace, &[board], test, names, &corner)?;
     }
     Ok(())
