@@ -273,8 +273,7 @@ fn sim(workspace: &mut Workspace) -> Result<()> {
 }
 
 fn suite(workspace: &mut Workspace) -> Result<()> {
-    let tests = "--test=suite --test=hil --test=hil_simulator";
-    simulated::run(workspace, &Board::ALL, tests, "", &[])
+    simulated::run(workspace, &Board::ALL, "--test=suite", "", &[])
 }
 
 fn tool(workspace: &mut Workspace) -> Result<()> {
