@@ -33,6 +33,9 @@ use register_map::{
 
 use crate::Device;
 
+/// The commit in its registers.
+const COMMIT: u128 = 0x1234_ABCD;
+
 /// The PDU of a reply, or an exception code.
 type Answer = Result<Vec<u8>, u8>;
 
@@ -285,6 +288,7 @@ impl Modio {
             state::FIRMWARE_VERSION => 0x0001,
             state::MAP_VERSION => state::MAP_VERSION_VALUE,
             state::BOARD => self.board.code,
+            state::COMMIT..state::BUILD => long(COMMIT, state::COMMIT + 1),
             state::UNIT_ADDRESS => 1,
             state::RESET_CAUSE => self.cause,
             state::UPTIME..state::STATUS => long(up.as_secs().into(), state::UPTIME + 1),
