@@ -3,12 +3,14 @@
 //! While the supply is too low for the flash, a save waits, before its first operation or between two operations.
 //! It continues once the supply has recovered. Until then another save is rejected as busy.
 
+use core::mem;
+
 use board_support::{Flash, flash::FlashError, kept};
 use firmware::{
     config::Settings,
     device::Restart,
     outputs::Schedule,
-    store::{Given, Operation, Saving, Store, WriteError},
+    store::{Given, Saving, Store, WriteError},
 };
 use rtic::Mutex;
 
@@ -17,17 +19,22 @@ use crate::{
     log::Event,
 };
 
-/// The store, and a save under way.
+/// What is under way in the store.
+enum Work {
+    Nothing,
+    /// The page that is no longer needed is to be erased, before anything else, so that no record has to erase one.
+    Erase,
+    /// A save waits for the supply.
+    Save(Saving<B>),
+}
+
+/// The store, and what is under way there.
 pub struct Persistence {
     store: Store<B>,
     pages: Flash,
-    saving: Option<Saving<B>>,
-    /// The operation of the save that the flash refused because of a low supply.
-    refused: Option<Operation>,
+    work: Work,
     /// The low supply has been logged.
     low: bool,
-    /// The page that is no longer needed is to be erased.
-    erase: bool,
     /// When outputs that are to start as they were are stored.
     schedule: Schedule,
 }
@@ -38,10 +45,8 @@ impl Persistence {
         Self {
             store,
             pages,
-            saving: None,
-            refused: None,
+            work: if erase { Work::Erase } else { Work::Nothing },
             low: false,
-            erase,
             schedule: Schedule::new(if BOARD.keeps_outputs {
                 kept::records()
             } else {
@@ -50,12 +55,11 @@ impl Persistence {
         }
     }
 
-    /// Begins a save that was ordered, or continues one, until its end or until the supply is too low, one flash
-    /// operation at a time with interrupts in between. Then restarts the device if that was ordered.
+    /// Begins a save that was ordered, or continues one, until its end or until the supply is too low. Then restarts the
+    /// device if that was ordered.
     pub fn work(&mut self, device: &mut impl Mutex<T = &'static mut Device>) -> Option<Event> {
         let mut event = None;
-        // Otherwise the page that is no longer needed is erased first, so that no record has to erase one itself.
-        if !self.erase {
+        if !matches!(self.work, Work::Erase) {
             if device.lock(|device| device.config.is_saving()) {
                 event = self.save(device);
             } else if BOARD.keeps_outputs {
@@ -89,15 +93,14 @@ impl Persistence {
     /// Erases the page that is no longer needed, if there is one, so that the next save does not have to. This
     /// takes up to 40 ms, on clones of the part 400 ms, during which only the tasks in RAM run.
     pub fn erase(&mut self) {
-        // A save that waits for the supply may have begun on that page.
-        if !self.erase || self.saving.is_some() || !self.pages.has_supply() || !Flash::may_erase() {
+        if !matches!(self.work, Work::Erase) || !self.pages.has_supply() || !Flash::may_erase() {
             return;
         }
-        self.erase = false;
+        self.work = Work::Nothing;
         // After a failure of the flash, the next save that needs the page erases it. If it is only too early, or the supply is
         // low, this function tries again.
         if let Err(WriteError::Flash(FlashError::NotNow)) = self.store.make_spare(&mut self.pages) {
-            self.erase = true;
+            self.work = Work::Erase;
         }
     }
 
@@ -121,19 +124,18 @@ impl Persistence {
         let Some(mut saving) = saving else {
             return;
         };
-        let given = Given::Outputs(&outputs);
-        while let Some(operation) = saving.next(&self.pages, given) {
-            if operation.perform(&mut self.pages).is_err() {
-                break;
-            }
-        }
         // A record that is not complete does not count.
+        let _ = saving.perform(&mut self.pages, Given::Outputs(&outputs));
         let _ = saving.finish(&mut self.store, &self.pages);
         self.end_of_record();
     }
 
     fn end_of_record(&mut self) {
-        self.erase = !self.store.has_spare();
+        self.work = if self.store.has_spare() {
+            Work::Nothing
+        } else {
+            Work::Erase
+        };
         Flash::has_worked();
     }
 
@@ -143,9 +145,9 @@ impl Persistence {
         // A copy, so that requests do not wait while the settings are encoded. They stay the same until the end of
         // the save.
         let settings = device.lock(|device| *device.config.to_save());
-        let mut saving = match self.saving.take() {
-            Some(saving) => saving,
-            None => {
+        let mut saving = match mem::replace(&mut self.work, Work::Nothing) {
+            Work::Save(saving) => saving,
+            Work::Nothing | Work::Erase => {
                 let Some(saving) = Saving::of_settings(&self.store, &self.pages, &settings) else {
                     // These settings are already stored, so nothing is written and the flash does not wear.
                     Self::end(&settings, device);
@@ -160,32 +162,17 @@ impl Persistence {
                 saving
             }
         };
-        let mut good = true;
         if !self.pages.has_supply() {
             return self.wait(saving);
         }
-        let given = Given::Settings(&settings);
-        while let Some(operation) = self
-            .refused
-            .take()
-            .or_else(|| saving.next(&self.pages, given))
-        {
-            match operation.perform(&mut self.pages) {
-                Ok(()) => {}
-                Err(WriteError::Flash(FlashError::NotNow)) => {
-                    self.refused = Some(operation);
-                    return self.wait(saving);
-                }
-                Err(_) => {
-                    good = false;
-                    break;
-                }
-            }
+        let performed = saving.perform(&mut self.pages, Given::Settings(&settings));
+        if let Err(WriteError::Flash(FlashError::NotNow)) = performed {
+            return self.wait(saving);
         }
         self.low = false;
-        good = saving.finish(&mut self.store, &self.pages).is_ok() && good;
+        let finished = saving.finish(&mut self.store, &self.pages);
         self.end_of_record();
-        Some(if good {
+        Some(if performed.is_ok() && finished.is_ok() {
             Self::end(&settings, device);
             Event::Saved
         } else {
@@ -196,8 +183,9 @@ impl Persistence {
 
     /// Reports the settings as not stored.
     fn fail(&mut self, device: &mut impl Mutex<T = &'static mut Device>) {
-        let stored = self.store.load(&self.pages).settings;
-        device.lock(|device| device.config.save_failed(stored));
+        let stored = self.store.load(&self.pages);
+        let invalid = stored.is_invalid();
+        device.lock(|device| device.config.save_failed(stored.settings, invalid));
     }
 
     /// Reports the settings as stored. Compares them outside the lock, so that requests do not wait.
@@ -209,8 +197,8 @@ impl Persistence {
 
     /// Keeps a save until the supply has recovered. Returns the event to log, once.
     fn wait(&mut self, saving: Saving<B>) -> Option<Event> {
-        self.saving = Some(saving);
+        self.work = Work::Save(saving);
         let is_low = !self.pages.has_supply();
-        (is_low && !core::mem::replace(&mut self.low, true)).then_some(Event::LowSupply)
+        (is_low && !mem::replace(&mut self.low, true)).then_some(Event::LowSupply)
     }
 }

@@ -90,7 +90,7 @@ pub fn up(
     let address = Address::from_dip(number, SLOT.is_some());
     let settings = start_up::line(address, LineConfig::of(&loaded.settings));
     let radio_config = RadioConfig::of(&loaded.settings);
-    let mut config = Config::new(loaded.settings, loaded.invalid || loaded.rejected > 0);
+    let mut config = Config::new(loaded.settings, loaded.is_invalid());
     config.set_saves_left(board.saves_left);
     let points_only = config.air_serves_points_only();
     // A radio does not serve recovery, whose address is the same for all units.

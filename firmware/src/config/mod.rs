@@ -49,15 +49,24 @@ pub use settings::RestartValues;
 pub use settings::Settings;
 use settings::{RESTARTS, format_suits_mode, has_deadband, is_setting, port_of, restart_addresses};
 
-/// How far a save is.
+/// Whether the settings are stored, or how far a save is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Save {
-    /// No save is ordered.
-    None,
+    /// The flash holds `saved`. No save is ordered.
+    Stored,
+    /// The flash does not hold `saved`, because what it holds is invalid. No save is ordered.
+    Invalid,
     /// The reply to the order has not been sent yet.
     Ordered,
     /// The settings to be stored are set aside.
     Begun,
+}
+
+impl Save {
+    /// Returns the state without a save. `invalid`: what the flash holds is invalid, as for [`Config::new`].
+    const fn of(invalid: bool) -> Self {
+        if invalid { Self::Invalid } else { Self::Stored }
+    }
 }
 
 /// A write that does nothing. It needs no lock, and every line may make it.
@@ -100,8 +109,6 @@ pub struct Config<B: Board> {
     /// Number of settings in `edited` that differ from `saved`.
     differences: u16,
     save: Save,
-    /// The flash does not hold `saved`, because the stored configuration was invalid at the start.
-    unstored: bool,
     saves: Budget<SAVES, SAVE_EVERY_S>,
     lock: Lock,
     /// Origin of the request that is being served.
@@ -142,8 +149,7 @@ impl<B: Board> Config<B> {
             edited: stored,
             saved: stored,
             differences: 0,
-            save: Save::None,
-            unstored: invalid,
+            save: Save::of(invalid),
             saves: Budget::new(SAVES),
             lock: Lock::default(),
             origin: Origin::default(),
@@ -289,8 +295,8 @@ impl<B: Board> Config<B> {
         self.check_line()?;
         let aired = self.origin.broadcast && self.is_over_the_air();
         let order = words.get(COMMAND.wrapping_sub(span.start()));
-        let cannot_save = order == Some(Command::Save.code())
-            && (self.save != Save::None || !self.can_pay(span, words));
+        let cannot_save =
+            order == Some(Command::Save.code()) && (self.has_save() || !self.can_pay(span, words));
         if aired || cannot_save || !(self.is_unlocked() || span == Span::single(KEY)) {
             return Err(Exception::ServerDeviceBusy);
         }
@@ -323,7 +329,7 @@ impl<B: Board> Config<B> {
                 .wrapping_sub(u16::from(self.edited.get(address) != saved))
                 .wrapping_add(u16::from(value != saved))
         });
-        differences == 0 && !self.unstored
+        differences == 0 && self.save != Save::Invalid
     }
 
     /// Returns whether values for points are allowed by the modules of their ports, and values for MODULE by the
@@ -511,16 +517,15 @@ impl<B: Board> Config<B> {
     /// Ends a successful save. `changed` says whether the saved settings need a restart to be in force, see
     /// [`Settings::needs_restart`].
     pub const fn end_save(&mut self, changed: bool) {
-        self.save = Save::None;
-        self.unstored = false;
+        self.save = Save::Stored;
         self.waiting = self.left != 0 || changed;
     }
 
-    /// Ends a save that failed. `stored` is what the flash still holds.
-    pub fn save_failed(&mut self, stored: Settings<B>) {
+    /// Ends a save that failed. `stored` is what a start would use now, and `invalid` as for [`Self::new`].
+    pub fn save_failed(&mut self, stored: Settings<B>, invalid: bool) {
         self.saved = stored;
         self.differences = self.edited.differences(&self.saved);
-        self.save = Save::None;
+        self.save = Save::of(invalid);
     }
 
     /// Takes one save from the budget, before the first operation on the flash. Returns the number of saves left, which
@@ -560,7 +565,7 @@ impl<B: Board> Config<B> {
     /// Returns whether a save is ordered or has begun.
     #[must_use]
     pub const fn has_save(&self) -> bool {
-        !matches!(self.save, Save::None)
+        matches!(self.save, Save::Ordered | Save::Begun)
     }
 
     /// Advances the time by `ms` milliseconds. The lock closes 60 s after the last write, and the budget gets one

@@ -69,6 +69,14 @@ pub struct Loaded<B: Board> {
     pub rejected: u16,
 }
 
+impl<B: Board> Loaded<B> {
+    /// Returns whether the flash holds something else than these settings.
+    #[must_use]
+    pub const fn is_invalid(&self) -> bool {
+        self.invalid || self.rejected > 0
+    }
+}
+
 /// The valid record that counts.
 #[derive(Clone, Copy, Debug)]
 struct Newest {

@@ -1,4 +1,4 @@
-//! A save, or a record of outputs, one flash operation at a time.
+//! A save, or a record of outputs.
 
 use core::iter;
 
@@ -20,7 +20,7 @@ pub enum Given<'a, B: Board> {
     Outputs(&'a [(u16, u16)]),
 }
 
-/// A save or a record of outputs under way. Pass the same values to every step.
+/// A save or a record of outputs under way. Pass the same values to every call.
 #[derive(Clone, Debug)]
 pub struct Saving<B: Board> {
     readying: Readying,
@@ -29,6 +29,8 @@ pub struct Saving<B: Board> {
     cursor: u16,
     /// The outputs that follow the settings of a save, or the settings in front of outputs.
     copied: Each<B::Kept, Copied>,
+    /// The operation that failed.
+    failed: Option<Operation>,
 }
 
 impl<B: Board> Saving<B> {
@@ -110,11 +112,31 @@ impl<B: Board> Saving<B> {
             writing: Writing::new(page, offset, encoder),
             cursor: 0,
             copied,
+            failed: None,
         }
     }
 
-    /// Returns the next operation, to be performed before the next call, or `None` when all are done.
-    pub fn next(&mut self, flash: &impl Pages, given: Given<'_, B>) -> Option<Operation> {
+    /// Performs the operations that are left, one after the other.
+    ///
+    /// # Errors
+    ///
+    /// When an operation fails. The next call begins with it.
+    pub fn perform<F: Pages>(
+        &mut self,
+        flash: &mut F,
+        given: Given<'_, B>,
+    ) -> Result<(), WriteError<F::Error>> {
+        while let Some(operation) = self.failed.take().or_else(|| self.next(flash, given)) {
+            if let Err(error) = operation.perform(flash) {
+                self.failed = Some(operation);
+                return Err(error);
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the next operation, or `None` when all are done.
+    fn next(&mut self, flash: &impl Pages, given: Given<'_, B>) -> Option<Operation> {
         if let Some(operation) = self.readying.next() {
             return Some(operation);
         }

@@ -45,14 +45,9 @@ pub fn save(
     let Some(mut saving) = Saving::of_settings(store, flash, settings) else {
         return Ok(false);
     };
-    while let Some(operation) = saving.next(flash, Given::Settings(settings)) {
-        if let Err(failure) = operation.perform(flash) {
-            // The error of the operation is more specific.
-            let _ = saving.finish(store, flash);
-            return Err(failure);
-        }
-    }
-    saving.finish(store, flash)?;
+    let performed = saving.perform(flash, Given::Settings(settings));
+    // The error of the operation is more specific.
+    performed.and(saving.finish(store, flash))?;
     Ok(true)
 }
 
@@ -65,14 +60,8 @@ pub fn record(
     let Some(mut saving) = Saving::of_outputs(store, flash, outputs) else {
         return Ok(false);
     };
-    let given: Given<'_, B> = Given::Outputs(outputs);
-    while let Some(operation) = saving.next(flash, given) {
-        if let Err(failure) = operation.perform(flash) {
-            let _ = saving.finish(store, flash);
-            return Err(failure);
-        }
-    }
-    saving.finish(store, flash)?;
+    let performed = saving.perform(flash, Given::Outputs(outputs));
+    performed.and(saving.finish(store, flash))?;
     Ok(true)
 }
 

@@ -173,9 +173,9 @@ fn what_is_stored_is_the_documented_record() {
     let (_, mut store) = start_well(&mut flash);
     let settings = settings(&STORED);
     let mut saving = Saving::of_settings(&store, &flash, &settings).unwrap();
-    while let Some(operation) = saving.next(&flash, Given::Settings(&settings)) {
-        operation.perform(&mut flash).unwrap();
-    }
+    saving
+        .perform(&mut flash, Given::Settings(&settings))
+        .unwrap();
     saving.finish(&mut store, &flash).unwrap();
     let bytes = firmware::store::Pages::page(&flash, Page::First);
     assert_eq!(bytes[..SEALED.len()], SEALED);

@@ -324,7 +324,7 @@ fn unsaved_is_reported_until_the_save_is_complete_and_after_a_failure() {
     assert_eq!(write(&mut config, COMMAND, &[1]), Ok(Some(Command::Save)));
     config.begin_save();
     assert_eq!(status(&config), status::UNSAVED);
-    config.save_failed(Settings::defaults());
+    config.save_failed(Settings::defaults(), false);
     assert_eq!(status(&config), status::UNSAVED);
     assert_eq!(read(&config, BETA, 1).unwrap(), [2000]);
     save(&mut config);
