@@ -27,6 +27,8 @@ mod bench;
 mod build;
 mod command;
 mod debug;
+#[cfg(test)]
+mod dependencies;
 mod dist;
 mod docs;
 mod error;
