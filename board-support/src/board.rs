@@ -13,15 +13,15 @@ use crate::{
     design::{CRYSTAL_FAULTS, DIP_POLL_US, DIP_SETTLE_CYCLES},
     dip, early,
     fault::FaultRecord,
-    gap::LineTimes,
+    gap_ticks::LineTimes,
     gesture::Watch,
     kept,
     pin::Pin,
     rs485,
-    second::SecondOff,
+    second_uart::SecondOff,
     unique_id, vectors, wait,
 };
-use ports::uart::LineSettings;
+use ports::line_settings::LineSettings;
 
 /// Flags in [`Board::reset_cause`].
 const WATCHDOG: u8 = 1 << 2;

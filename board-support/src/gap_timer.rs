@@ -24,11 +24,11 @@ use crate::{
     boards::BOARD,
     design::LONGEST_WAIT_US,
     edge::Edge,
-    gap::{CharacterBits, GapTicks, LimitTicks, LineTimes},
+    gap_ticks::{CharacterBits, GapTicks, LimitTicks, LineTimes},
 };
 use ports::{
     line::{Alarms, GapTimer, Silence},
-    uart::LineSettings,
+    line_settings::LineSettings,
 };
 
 /// The external interrupt for the edges of the line, if TIM1 does not capture them.

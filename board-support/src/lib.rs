@@ -2,22 +2,22 @@
 //!
 //! `board::setup` starts the clocks, reads the DIP switch and returns one `Board` whose fields are the devices.
 //! This is the only crate that uses the HAL. A port to another board is a descriptor in [`boards`]. The parts
-//! without hardware access ([`design`], [`uart`], [`gap`], the logic of [`fault`] and of the
+//! without hardware access ([`design`], [`baud_rate`], [`gap_ticks`], the logic of [`fault`] and of the
 //! recovery of an I2C bus) are built and tested on the host.
 
 #![no_std]
 
+pub mod baud_rate;
 pub mod boards;
 pub mod design;
 pub mod fault;
 mod full_scale;
-pub mod gap;
+pub mod gap_ticks;
 pub mod gesture;
 #[cfg(any(target_os = "none", test))]
 mod i2c;
 pub mod kept;
 mod pin;
-pub mod uart;
 mod usart;
 
 #[cfg(target_os = "none")]
@@ -59,7 +59,7 @@ mod safe;
 #[cfg(target_os = "none")]
 mod scan_timer;
 #[cfg(target_os = "none")]
-mod second;
+mod second_uart;
 #[cfg(target_os = "none")]
 mod slot;
 #[cfg(target_os = "none")]
@@ -88,7 +88,7 @@ pub use {
     rs485::{Rs485, disable_driver},
     safe::outputs_off,
     scan_timer::ScanTimer,
-    second::{Damaged, Proof as SecondProof, RadioIo, SecondOff, SecondUart},
+    second_uart::{Damaged, Proof as SecondProof, RadioIo, SecondOff, SecondUart},
     stm32f1xx_hal::pac,
     watchdog::Watchdog,
 };

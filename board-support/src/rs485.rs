@@ -8,14 +8,14 @@ use stm32f1xx_hal::pac::{self, usart1::RegisterBlock};
 
 use crate::{
     ClockSource,
+    baud_rate::divider,
     boards::BOARD,
     pin::{Mode, Pin},
-    uart::divider,
     usart::Usart,
 };
 use ports::{
     line::{Character, Uart},
-    uart::{Format, LineSettings},
+    line_settings::{Format, LineSettings},
 };
 
 /// The UART's flags and interrupt enables, as [`Uart::status`] read them.

@@ -19,7 +19,7 @@ use modbus_server::{
     line::{Faults, Gaps, Port, Receiver, Units},
 };
 use modio_drivers::Lora;
-use ports::uart::LineSettings;
+use ports::line_settings::LineSettings;
 
 use crate::config::RadioConfig;
 

@@ -6,6 +6,6 @@
 #![no_std]
 
 pub mod line;
+pub mod line_settings;
 pub mod marks;
 pub mod pages;
-pub mod uart;

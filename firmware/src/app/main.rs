@@ -20,7 +20,7 @@ mod every;
 mod fault_record;
 mod installed;
 mod keeping;
-mod line;
+mod line_setup;
 mod log;
 mod persistence;
 mod rtt;
@@ -46,7 +46,7 @@ mod app {
         background::Background,
         board::Device,
         clock,
-        line::Line,
+        line_setup::Line,
         log::Event,
         scanning::Scanning,
         second::{Polling, Second, on_interrupt},

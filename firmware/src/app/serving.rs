@@ -21,7 +21,7 @@ use rtic::Mutex;
 
 use crate::{
     board::{BOARD, Device, Events},
-    line::Line,
+    line_setup::Line,
     second::{Second, in_use},
 };
 

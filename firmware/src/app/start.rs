@@ -30,7 +30,7 @@ use crate::{
     board::{BOARD, Device, Events},
     fault_record,
     installed::install,
-    line::{Frames, Line},
+    line_setup::{Frames, Line},
     log::{self, Log},
     persistence::Persistence,
     scanning::Scanning,

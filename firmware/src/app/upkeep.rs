@@ -7,7 +7,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use board_support::{Part, Registers, ScanTimer, Wrong};
 use firmware::repairs::Repairs;
 
-use crate::line::Line;
+use crate::line_setup::Line;
 
 /// Something was repaired since the last [`take_repaired`].
 static REPAIRED: AtomicBool = AtomicBool::new(false);

@@ -12,7 +12,7 @@
 //! A character that has begun by t1.5 or t3.5 raises its flag within one more character time. The decision can be
 //! delayed by that much and no longer.
 
-use ports::uart::{Format, LineSettings};
+use ports::line_settings::{Format, LineSettings};
 
 /// Times on a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -175,7 +175,7 @@ const fn cycles(clock_mhz: u32, ns: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ports::uart::Format;
+    use ports::line_settings::Format;
 
     #[test]
     fn the_last_falling_edge_of_a_character_is_found() {

@@ -1,12 +1,12 @@
-//! The RS-485 line of the board.
+//! The RS-485 line of the board, set up as its settings say.
 
-use board_support::{Rs485, Rs485Timer, board::LineOff, gap::LineTimes, pac};
+use board_support::{Rs485, Rs485Timer, board::LineOff, gap_ticks::LineTimes, pac};
 use firmware::{config::LineConfig, line};
 use modbus_server::{
     Adu,
     line::{Framing, Gaps, Port, Receiver, Width, Windows},
 };
-use ports::uart;
+use ports::line_settings::{self, LineSettings};
 use register_map::codes::{Format, GapRule, Mode};
 
 use crate::board::{BOARD, Units};
@@ -17,7 +17,7 @@ pub type Line = line::Line<Rs485, Rs485Timer, Units>;
 /// What the line does with these settings.
 pub struct Frames<'a> {
     settings: &'a LineConfig,
-    on_wire: uart::LineSettings,
+    on_wire: LineSettings,
     gaps: Gaps,
     /// RTU or ASCII.
     pub framing: Framing,
@@ -89,7 +89,7 @@ impl<'a> Frames<'a> {
 
 /// Returns a limit for the duration of a reply in microseconds: the longest frame with a bit between characters, as clones
 /// of the part send it, and with 2 % and a millisecond in reserve.
-fn longest_reply_us(line: uart::LineSettings, framing: Framing) -> u32 {
+fn longest_reply_us(line: LineSettings, framing: Framing) -> u32 {
     // V1.02 2.5.1 and 2.5.2.1: 256 bytes in RTU mode, 513 characters in ASCII mode.
     let characters = match framing {
         Framing::Rtu => 256,
@@ -101,17 +101,17 @@ fn longest_reply_us(line: uart::LineSettings, framing: Framing) -> u32 {
     us + us / 50 + 1_000
 }
 
-fn wire_settings(line: &LineConfig) -> uart::LineSettings {
-    uart::LineSettings {
+fn wire_settings(line: &LineConfig) -> LineSettings {
+    LineSettings {
         baud: line.baud,
         format: match line.format {
-            Format::F8N2 => uart::Format::N2,
-            Format::F8E1 => uart::Format::E1,
-            Format::F8O1 => uart::Format::O1,
-            Format::F8N1 => uart::Format::N1,
-            Format::F7E1 => uart::Format::SevenE1,
-            Format::F7O1 => uart::Format::SevenO1,
-            Format::F7N2 => uart::Format::SevenN2,
+            Format::F8N2 => line_settings::Format::N2,
+            Format::F8E1 => line_settings::Format::E1,
+            Format::F8O1 => line_settings::Format::O1,
+            Format::F8N1 => line_settings::Format::N1,
+            Format::F7E1 => line_settings::Format::SevenE1,
+            Format::F7O1 => line_settings::Format::SevenO1,
+            Format::F7N2 => line_settings::Format::SevenN2,
         },
     }
 }

@@ -7,13 +7,13 @@ use stm32f1xx_hal::pac;
 
 use crate::{
     ClockSource, IoPin,
+    baud_rate::divider,
     boards::{BOARD, RadioPins, SecondPins},
     fitted::{self, Fitted},
     pin::Mode,
-    uart::divider,
     usart::Usart,
 };
-use ports::uart::LineSettings;
+use ports::line_settings::LineSettings;
 
 /// The UART. Without a second line there is no proof of one, so this is never used.
 const UART: Usart = match BOARD.second {
