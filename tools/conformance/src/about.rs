@@ -8,9 +8,9 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use serialport::{SerialPortInfo, SerialPortType};
 
-use crate::bench::Bench;
 use crate::case::Check;
 use crate::target::{Modio, Span};
+use crate::tester::Tester;
 
 /// First version of the register map that has the registers of [`COMMIT`].
 const MAP_WITH_COMMIT: u16 = 2;
@@ -103,8 +103,8 @@ fn add(name: &str, value: &Value, all: &mut Vec<(String, String)>) {
 
 impl Unit {
     /// Reads the registers of the unit, a modio with these modules.
-    pub fn ask(bench: &mut Bench<'_>, modules: Modio) -> Check<Self> {
-        let mut read = |first, count| bench.read_words(Span::of(first, count));
+    pub fn ask(tester: &mut Tester<'_>, modules: Modio) -> Check<Self> {
+        let mut read = |first, count| tester.read_words(Span::of(first, count));
         let version = read(state::FIRMWARE_VERSION, 3)?;
         let [firmware, patch, map] = version[..] else {
             unreachable!("three registers were read");
@@ -119,7 +119,7 @@ impl Unit {
         };
         let identity = read(state::UNIQUE_ID, 6)?;
         Ok(Self {
-            address: bench.unit(),
+            address: tester.unit(),
             firmware: state::version([firmware, patch], build).to_string(),
             commit,
             identity: identity.iter().map(|word| format!("{word:04X}")).collect(),

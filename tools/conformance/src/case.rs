@@ -1,6 +1,6 @@
 //! A case: its name, the section that it tests, its needs, and the function that runs it.
 
-use crate::bench::Bench;
+use crate::tester::Tester;
 
 pub use crate::check::{Check, Failure, Part, Stop, skip};
 
@@ -99,9 +99,9 @@ pub struct Case {
 #[derive(Clone, Copy, Debug)]
 pub enum Run {
     /// The case has one verdict.
-    Whole(fn(&mut Bench<'_>) -> Check),
+    Whole(fn(&mut Tester<'_>) -> Check),
     /// There is a verdict for each part of the case, such as a wire or a rate. The function calls the closure with each part.
-    Parts(fn(&mut Bench<'_>, &mut dyn FnMut(Part)) -> Check),
+    Parts(fn(&mut Tester<'_>, &mut dyn FnMut(Part)) -> Check),
 }
 
 impl Case {
@@ -118,7 +118,7 @@ pub const fn case(
     section: &'static str,
     about: &'static str,
     needs: &'static [Need],
-    run: fn(&mut Bench<'_>) -> Check,
+    run: fn(&mut Tester<'_>) -> Check,
 ) -> Case {
     new(name, section, about, needs, Run::Whole(run))
 }
@@ -129,7 +129,7 @@ pub const fn parts(
     section: &'static str,
     about: &'static str,
     needs: &'static [Need],
-    run: fn(&mut Bench<'_>, &mut dyn FnMut(Part)) -> Check,
+    run: fn(&mut Tester<'_>, &mut dyn FnMut(Part)) -> Check,
 ) -> Case {
     new(name, section, about, needs, Run::Parts(run))
 }

@@ -7,7 +7,7 @@
 //!
 //! ```text
 //! main, cli      the command                  case, cases/   the cases
-//! probe, profile the unit under test: Target  bench, points  steps of cases: requests and checks
+//! probe, profile the unit under test: Target  tester, points steps of cases: requests and checks
 //! endpoint/      the lines                    run, report/   runs cases; table, JUnit, JSON
 //! frame          RTU and ASCII frames         vectors        worked frames of manuals
 //! hil/           a bench with a board         interrupt      Ctrl-C
@@ -19,7 +19,6 @@
 #![forbid(unsafe_code)]
 
 pub mod about;
-pub mod bench;
 pub mod case;
 pub mod cases;
 pub mod check;
@@ -35,4 +34,5 @@ pub mod rate;
 pub mod report;
 pub mod run;
 pub mod target;
+pub mod tester;
 pub mod vectors;

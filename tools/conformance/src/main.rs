@@ -9,7 +9,6 @@ use anyhow::{anyhow, ensure};
 use clap::{CommandFactory as _, FromArgMatches as _};
 
 use conformance::about::{About, Unit};
-use conformance::bench::Bench;
 use conformance::cases::each_rate;
 use conformance::cli::Cli;
 use conformance::endpoint::trace::Trace;
@@ -19,6 +18,7 @@ use conformance::probe::{Given, probe};
 use conformance::report::{Report, Totals, json, junit, table};
 use conformance::run::{Verdict, run_until};
 use conformance::target::{Support, Target};
+use conformance::tester::Tester;
 
 fn main() -> ExitCode {
     let arguments = Cli::command()
@@ -91,14 +91,14 @@ fn test(cli: Cli) -> anyhow::Result<u8> {
     let mut target = probe(endpoint.as_mut(), &given)?;
     target.hil = cli.of_bench();
     is_wanted(&cli, &target)?;
-    let mut bench = Bench::new(endpoint.as_mut(), &target);
-    let unit = target.modio.map(|modio| Unit::ask(&mut bench, modio));
+    let mut tester = Tester::new(endpoint.as_mut(), &target);
+    let unit = target.modio.map(|modio| Unit::ask(&mut tester, modio));
     report.about.unit = unit.transpose()?;
     say(format_args!("{}: {}", report.endpoint, found(&target)));
     for (name, value) in report.about.properties() {
         say(format_args!("{name}: {value}"));
     }
-    let least = each_rate::least(&bench).as_secs();
+    let least = each_rate::least(&tester).as_secs();
     if least > 0 {
         let requests = target.hil.requests;
         say(format_args!(

@@ -6,9 +6,9 @@ use std::time::Duration;
 pub use modbus_line::adu::{pdu, words_of, write_words};
 use register_map::configuration::{KEY, OPEN_S, OPENING_KEY};
 
-use crate::bench::Bench;
 use crate::case::{Check, Stop};
 use crate::target::{Span, Words};
+use crate::tester::Tester;
 
 /// Interval at which a unit is asked whether its configuration lock has closed.
 const LOCK_INTERVAL: Duration = Duration::from_secs(1);
@@ -38,7 +38,7 @@ pub struct Snapshot {
     words: Option<Vec<u16>>,
 }
 
-impl Bench<'_> {
+impl Tester<'_> {
     /// Coils to write to.
     pub fn bits(&self) -> Check<Span> {
         let lacking = || Stop::Skip("no coil to write to".to_owned());

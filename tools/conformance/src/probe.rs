@@ -7,7 +7,6 @@ use anyhow::{Context as _, Result, bail, ensure};
 use register_map::points::{self, Kind, output_values};
 use register_map::{BLOCKS, Board, Module, Rule, Values, codes, configuration, links, state};
 
-use crate::bench::Bench;
 use crate::case::Check;
 use crate::endpoint::Endpoint;
 use crate::frame::{Mode, Reply};
@@ -16,6 +15,7 @@ use crate::points::pdu;
 use crate::profile::Profile;
 use crate::target::Patience;
 use crate::target::{Modio, Span, Support, Target, Words};
+use crate::tester::Tester;
 
 /// What the user has given, before the unit is asked.
 #[derive(Clone, Debug)]
@@ -97,7 +97,7 @@ pub fn probe(endpoint: &mut dyn Endpoint, given: &Given<'_>) -> Result<Target> {
             ),
             _ => bail!("unit {unit} answers but is not a modio: describe it with --profile FILE"),
         }
-        target = modio(&mut Bench::new(endpoint, &target))?;
+        target = modio(&mut Tester::new(endpoint, &target))?;
     }
     if listed.is_none() {
         for function in FUNCTIONS {
@@ -125,7 +125,7 @@ pub fn probe(endpoint: &mut dyn Endpoint, given: &Given<'_>) -> Result<Target> {
 }
 
 fn ask(endpoint: &mut dyn Endpoint, target: &Target, pdu: &[u8]) -> Check<Reply> {
-    Bench::new(endpoint, target).ask_due(pdu)
+    Tester::new(endpoint, target).ask_due(pdu)
 }
 
 /// Asks a unit that may be starting, or may still have earlier bytes in its receiver. Repeats the request until the unit
@@ -175,21 +175,21 @@ fn ping(target: &Target, has: impl Fn(u8) -> bool) -> Option<Vec<u8>> {
 }
 
 /// Reads from a modio's registers what the modio has, and how much longer than t3.5 its reply may take.
-fn modio(bench: &mut Bench<'_>) -> Check<Target> {
-    let board = Board::from_code(bench.read_word(state::BOARD)?);
-    let codes = bench.read_words(Span::of(state::MODULE_IN_FORCE, points::PORTS))?;
+fn modio(tester: &mut Tester<'_>) -> Check<Target> {
+    let board = Board::from_code(tester.read_word(state::BOARD)?);
+    let codes = tester.read_words(Span::of(state::MODULE_IN_FORCE, points::PORTS))?;
     let mut modules = [Module::None; points::PORTS as usize];
     for (module, code) in modules.iter_mut().zip(codes) {
         *module = Module::from_code(code).unwrap_or(Module::None);
     }
     let modio = Modio { board, modules };
-    let delay = bench.read_word(configuration::RESPONSE_DELAY)?;
-    let gap = bench.read_word(configuration::FRAME_GAP)?;
-    let strict = bench.read_word(configuration::STRICT_T15)?;
+    let delay = tester.read_word(configuration::RESPONSE_DELAY)?;
+    let gap = tester.read_word(configuration::FRAME_GAP)?;
+    let strict = tester.read_word(configuration::STRICT_T15)?;
     let slower =
         Duration::from_millis(u64::from(delay)) + Duration::from_micros(100) * u32::from(gap);
 
-    let mut target = bench.target.clone();
+    let mut target = tester.target.clone();
     target.patience.reply += slower;
     target.patience.silence += slower;
     target.modio = Some(modio);
@@ -223,7 +223,7 @@ fn modio(bench: &mut Bench<'_>) -> Check<Target> {
     target.readable = [bits.clone(), bits, registers.clone(), registers];
     target.bits = modio.runs(&[Kind::BitOutput]).first().copied();
     target.words = match modio.runs(&[Kind::WordOutput]).first() {
-        Some(span) => Some(outputs(bench, *span)?),
+        Some(span) => Some(outputs(tester, *span)?),
         // A setting that touches no output: the NTC constants.
         None if target.allow_config => Some(Words {
             span: Span::of(configuration::BETA, points::COUNT),
@@ -238,10 +238,10 @@ fn modio(bench: &mut Bench<'_>) -> Check<Target> {
 }
 
 /// Reads the values that analog outputs accept. Returns the first outputs of the span that accept the same values.
-fn outputs(bench: &mut Bench<'_>, span: Span) -> Check<Words> {
+fn outputs(tester: &mut Tester<'_>, span: Span) -> Check<Words> {
     let mut of_point = |point: u16| {
-        let scale = bench.read_word(configuration::SCALE + point)?;
-        let signal = bench.read_word(configuration::RANGE + point)?;
+        let scale = tester.read_word(configuration::SCALE + point)?;
+        let signal = tester.read_word(configuration::RANGE + point)?;
         Check::Ok(output_values(
             codes::Signal::from_code(signal).unwrap_or(codes::Signal::Voltage),
             codes::Scale::from_code(scale).unwrap_or(codes::Scale::Raw),

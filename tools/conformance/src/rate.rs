@@ -6,11 +6,11 @@ use modbus_line::LineFormat;
 use register_map::codes::Command;
 use register_map::configuration::{BAUD, COMMAND, SAVE_EVERY_S};
 
-use crate::bench::Bench;
 use crate::case::{Check, Stop, skip};
 use crate::frame::{Reply, hex};
 use crate::points::{pdu, write_words};
 use crate::target::codes;
+use crate::tester::Tester;
 
 /// Time for the unit to store its configuration.
 const STORING: Duration = Duration::from_millis(200);
@@ -34,28 +34,28 @@ const ATTEMPTS: u32 = 3;
 /// Otherwise the error of the first change or visit that failed, or of restoring the rate. In the last case the unit
 /// may be at another rate than before, and the endpoint is at the rate at which the unit last answered.
 pub fn tour(
-    bench: &mut Bench<'_>,
+    tester: &mut Tester<'_>,
     stops: impl IntoIterator<Item = LineFormat>,
-    mut visit: impl FnMut(&mut Bench<'_>) -> Check,
+    mut visit: impl FnMut(&mut Tester<'_>) -> Check,
 ) -> Check {
-    let home = bench.endpoint.line();
-    let patience = bench.patience;
+    let home = tester.endpoint.line();
+    let patience = tester.patience;
     let stops: Vec<LineFormat> = stops.into_iter().collect();
-    takes_all(bench, &stops, home)?;
+    takes_all(tester, &stops, home)?;
     let mut result = Ok(());
     // Whether the unit's stored rate is the rate in force.
     let mut settled = true;
     for to in stops {
-        let from = bench.endpoint.line();
+        let from = tester.endpoint.line();
         if to != from {
-            result = move_to(bench, to);
+            result = move_to(tester, to);
             if result.is_err() {
                 settled = false;
-                look_for_it(bench, [from, to, home])?;
+                look_for_it(tester, [from, to, home])?;
             }
         }
         if result.is_ok() {
-            result = visit(bench);
+            result = visit(tester);
         }
         if result.is_err() {
             break;
@@ -63,25 +63,25 @@ pub fn tour(
     }
     let mut back = Ok(());
     for _ in 0..ATTEMPTS {
-        let from = bench.endpoint.line();
+        let from = tester.endpoint.line();
         if settled && from == home {
             break;
         }
-        back = move_to(bench, home);
+        back = move_to(tester, home);
         settled = back.is_ok();
         if !settled {
-            look_for_it(bench, [from, home, from])?;
+            look_for_it(tester, [from, home, from])?;
         }
     }
-    bench.patience = patience;
+    tester.patience = patience;
     result.and(back)
 }
 
 /// Checks that the endpoint supports these rates and formats. An adapter may lack a rate, a pseudo-terminal parity.
-fn takes_all(bench: &mut Bench<'_>, lines: &[LineFormat], home: LineFormat) -> Check {
+fn takes_all(tester: &mut Tester<'_>, lines: &[LineFormat], home: LineFormat) -> Check {
     for line in lines.iter().filter(|line| **line != home) {
-        let taken = bench.endpoint.set_line(*line);
-        bench.endpoint.set_line(home)?;
+        let taken = tester.endpoint.set_line(*line);
+        tester.endpoint.set_line(home)?;
         if let Err(why) = taken {
             return skip(why.to_string());
         }
@@ -90,10 +90,10 @@ fn takes_all(bench: &mut Bench<'_>, lines: &[LineFormat], home: LineFormat) -> C
 }
 
 /// Sets the endpoint to the first of these lines at which the unit answers, else to the last.
-fn look_for_it(bench: &mut Bench<'_>, lines: [LineFormat; 3]) -> Check {
+fn look_for_it(tester: &mut Tester<'_>, lines: [LineFormat; 3]) -> Check {
     for line in lines {
-        bench.endpoint.set_line(line)?;
-        if bench.alive("a change that failed").is_ok() {
+        tester.endpoint.set_line(line)?;
+        if tester.alive("a change that failed").is_ok() {
             break;
         }
     }
@@ -102,44 +102,44 @@ fn look_for_it(bench: &mut Bench<'_>, lines: [LineFormat; 3]) -> Check {
 
 /// Saves the configuration, whose lock must be open. A unit that refuses, because there were too many saves, accepts
 /// another one within a minute.
-fn save(bench: &mut Bench<'_>) -> Check {
+fn save(tester: &mut Tester<'_>) -> Check {
     let request = pdu(6, COMMAND, Command::Save.code());
-    let latest = bench.endpoint.now() + SAVED_AGAIN;
+    let latest = tester.endpoint.now() + SAVED_AGAIN;
     loop {
-        let reply = bench.ask_due(&request)?;
-        if reply.exception(6) != Some(6) || bench.endpoint.now() > latest {
+        let reply = tester.ask_due(&request)?;
+        if reply.exception(6) != Some(6) || tester.endpoint.now() > latest {
             let echoed = reply == Reply::Pdu(request.clone());
-            bench.ensure(echoed, format!("the PDU {}", hex(&request)))?;
-            bench.rest(STORING)?;
+            tester.ensure(echoed, format!("the PDU {}", hex(&request)))?;
+            tester.rest(STORING)?;
             return Ok(());
         }
-        bench.rest(SAVE_INTERVAL)?;
+        tester.rest(SAVE_INTERVAL)?;
         // The lock would close in this time, because a refused write does not keep it open.
-        bench.unlock()?;
+        tester.unlock()?;
     }
 }
 
 /// Writes, saves and restarts the unit with another rate and format, and sets the endpoint to them.
-fn move_to(bench: &mut Bench<'_>, to: LineFormat) -> Check {
-    bench.unlock()?;
+fn move_to(tester: &mut Tester<'_>, to: LineFormat) -> Check {
+    tester.unlock()?;
     let values = codes(to).map_err(Stop::Skip)?;
     let request = write_words(BAUD, &values);
-    bench.reply_is(&request, &request[..5])?;
+    tester.reply_is(&request, &request[..5])?;
     // The old rate is in force until the restart.
-    bench.alive("a new rate that is in force after the restart")?;
-    save(bench)?;
+    tester.alive("a new rate that is in force after the restart")?;
+    save(tester)?;
     let request = pdu(6, COMMAND, Command::Restart.code());
-    bench.reply_is(&request, &request)?;
-    bench.rest(STORING)?;
-    bench.endpoint.set_line(to)?;
-    bench.patience.quiet = bench.patience.quiet.max(to.t35() + to.characters(2));
-    bench.patience.reply = bench.patience.reply.max(to.t35() * 2 + to.characters(4));
-    let latest = bench.endpoint.now() + START;
+    tester.reply_is(&request, &request)?;
+    tester.rest(STORING)?;
+    tester.endpoint.set_line(to)?;
+    tester.patience.quiet = tester.patience.quiet.max(to.t35() + to.characters(2));
+    tester.patience.reply = tester.patience.reply.max(to.t35() * 2 + to.characters(4));
+    let latest = tester.endpoint.now() + START;
     loop {
-        bench.rest(INTERVAL)?;
-        let answered = bench.alive(format!("the change to {to}"));
+        tester.rest(INTERVAL)?;
+        let answered = tester.alive(format!("the change to {to}"));
         let silent = matches!(answered, Err(Stop::Fail(_)));
-        if !silent || bench.endpoint.now() >= latest {
+        if !silent || tester.endpoint.now() >= latest {
             return answered;
         }
     }

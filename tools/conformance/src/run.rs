@@ -8,13 +8,13 @@ use register_map::codes::Command;
 use register_map::configuration::COMMAND;
 use serde_json::Value;
 
-use crate::bench::Bench;
 use crate::case::{Case, Failure, Need, Part, Run, Stop};
 use crate::endpoint::{Broken, Endpoint};
 use crate::frame::Mode;
 use crate::hil::bench_file::Wire;
 use crate::points::pdu;
 use crate::target::{Support, Target};
+use crate::tester::Tester;
 
 /// How a case ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -111,19 +111,19 @@ pub fn run_until(
         match lacking {
             Some(why) => done(Outcome::of(*case, Verdict::Skipped(why), Duration::ZERO, 0)),
             None => {
-                let mut bench = Bench::new(endpoint, target);
-                bench.stop = stop;
-                one(bench, case, &mut done)?;
+                let mut tester = Tester::new(endpoint, target);
+                tester.stop = stop;
+                one(tester, case, &mut done)?;
             }
         }
     }
     if target.allow_config && target.modio.is_some() {
         // Settings that cases have changed and restored still count as unsaved changes. Drop these changes.
-        let mut bench = Bench::new(endpoint, target);
-        if bench.unlock().is_ok() {
+        let mut tester = Tester::new(endpoint, target);
+        if tester.unlock().is_ok() {
             let drop_changes = pdu(6, COMMAND, Command::DropChanges.code());
             // A failure is harmless: every case has restored what it changed.
-            let _ = bench.ask(&drop_changes);
+            let _ = tester.ask(&drop_changes);
         }
     }
     Ok(())
@@ -131,34 +131,34 @@ pub fn run_until(
 
 /// Runs a case, and calls `done` with its outcome, or with those of its parts. A case that has parts gets a further outcome
 /// when it did not come to its end.
-fn one(mut bench: Bench<'_>, case: &Case, done: &mut dyn FnMut(Outcome)) -> Result<(), Broken> {
-    let begin = bench.endpoint.now();
+fn one(mut tester: Tester<'_>, case: &Case, done: &mut dyn FnMut(Outcome)) -> Result<(), Broken> {
+    let begin = tester.endpoint.now();
     let writes = case
         .needs
         .iter()
         .any(|need| matches!(need, Need::Bits | Need::Words));
-    let locked = case.needs.contains(&Need::Words) && bench.target.words.is_some_and(|w| w.locked);
+    let locked = case.needs.contains(&Need::Words) && tester.target.words.is_some_and(|w| w.locked);
     let mut before = None;
     let result = (|| {
         if case.needs.contains(&Need::LockClosed) {
-            bench.wait_for_lock()?;
+            tester.wait_for_lock()?;
         }
         if locked {
-            bench.unlock()?;
+            tester.unlock()?;
         }
         if writes {
-            before = Some(bench.snapshot()?);
+            before = Some(tester.snapshot()?);
         }
         match case.run {
-            Run::Whole(run) => run(&mut bench),
-            Run::Parts(run) => run(&mut bench, &mut |part| done(Outcome::of_part(*case, part))),
+            Run::Whole(run) => run(&mut tester),
+            Run::Parts(run) => run(&mut tester, &mut |part| done(Outcome::of_part(*case, part))),
         }
     })();
     let restored = match &before {
-        Some(before) => bench.restore(before),
+        Some(before) => tester.restore(before),
         None => Ok(()),
     };
-    let complaints = bench.endpoint.take_complaints()?;
+    let complaints = tester.endpoint.take_complaints()?;
     let verdict = match result.and(restored) {
         Ok(()) if !complaints.is_empty() => Verdict::Failed(Failure {
             sent: case.about.to_owned(),
@@ -171,8 +171,8 @@ fn one(mut bench: Bench<'_>, case: &Case, done: &mut dyn FnMut(Outcome)) -> Resu
         Err(Stop::Fail(failure)) => Verdict::Failed(failure),
         Err(Stop::Broken(broken)) => return Err(broken),
     };
-    let time = bench.endpoint.now().saturating_sub(begin);
-    done(Outcome::of(*case, verdict, time, bench.asked_again));
+    let time = tester.endpoint.now().saturating_sub(begin);
+    done(Outcome::of(*case, verdict, time, tester.asked_again));
     Ok(())
 }
 

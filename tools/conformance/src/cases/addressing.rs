@@ -1,9 +1,9 @@
 //! Addresses of frames: other units, reserved addresses, broadcasts.
 
-use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case};
 use crate::cases::line_counters::count;
 use crate::points::{diagnose, pdu, write_bits, write_words};
+use crate::tester::Tester;
 
 #[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
@@ -32,92 +32,92 @@ pub(super) const CASES: &[Case] = &[
 
 /// Returns the addresses of other units: all of them where time is exact, elsewhere those that differ from this unit's
 /// address in one bit, and 1, 2 and 247.
-fn others(bench: &Bench<'_>) -> Vec<u8> {
-    let unit = bench.unit();
-    let all = bench.exact(true, false);
+fn others(tester: &Tester<'_>) -> Vec<u8> {
+    let unit = tester.unit();
+    let all = tester.exact(true, false);
     let near = |address: u8| (address ^ unit).count_ones() == 1 || [1, 2, 247].contains(&address);
     let mut others: Vec<u8> = (1..=247).collect();
     others.retain(|address| *address != unit && (all || near(*address)));
     others
 }
 
-fn reserved_addresses(bench: &Bench<'_>) -> Vec<u8> {
-    (248..=255).filter(|a| *a != bench.unit()).collect()
+fn reserved_addresses(tester: &Tester<'_>) -> Vec<u8> {
+    (248..=255).filter(|a| *a != tester.unit()).collect()
 }
 
-fn silent_to(bench: &mut Bench<'_>, unit: u8, pdu: &[u8]) -> Check {
-    let why = format!("the frame is for address {unit}, not for {}", bench.unit());
-    bench.silence_of(unit, pdu, why)
+fn silent_to(tester: &mut Tester<'_>, unit: u8, pdu: &[u8]) -> Check {
+    let why = format!("the frame is for address {unit}, not for {}", tester.unit());
+    tester.silence_of(unit, pdu, why)
 }
 
-fn other_units(bench: &mut Bench<'_>) -> Check {
-    let ping = bench.target.ping.clone();
-    for unit in others(bench) {
-        silent_to(bench, unit, &ping)?;
+fn other_units(tester: &mut Tester<'_>) -> Check {
+    let ping = tester.target.ping.clone();
+    for unit in others(tester) {
+        silent_to(tester, unit, &ping)?;
     }
-    bench.alive("requests for all other units")
+    tester.alive("requests for all other units")
 }
 
-fn reserved(bench: &mut Bench<'_>) -> Check {
-    let ping = bench.target.ping.clone();
-    for unit in reserved_addresses(bench) {
-        silent_to(bench, unit, &ping)?;
+fn reserved(tester: &mut Tester<'_>) -> Check {
+    let ping = tester.target.ping.clone();
+    for unit in reserved_addresses(tester) {
+        silent_to(tester, unit, &ping)?;
     }
-    bench.alive("requests for reserved addresses")
+    tester.alive("requests for reserved addresses")
 }
 
-fn few_others(bench: &Bench<'_>) -> Vec<u8> {
-    let unit = bench.unit();
-    let mut few = vec![unit ^ 1, unit ^ 2, bench.other(), 248, 254, 255];
+fn few_others(tester: &Tester<'_>) -> Vec<u8> {
+    let unit = tester.unit();
+    let mut few = vec![unit ^ 1, unit ^ 2, tester.other(), 248, 254, 255];
     few.retain(|address| ![0, unit].contains(address));
     few
 }
 
-fn other_units_write(bench: &mut Bench<'_>) -> Check {
-    let span = bench.bits()?.up_to(1);
-    bench.set_bits(span.first, &[false])?;
-    for unit in few_others(bench) {
-        silent_to(bench, unit, &pdu(5, span.first, 0xFF00))?;
-        silent_to(bench, unit, &write_bits(span.first, &[true], false))?;
-        bench.is_off(span)?;
+fn other_units_write(tester: &mut Tester<'_>) -> Check {
+    let span = tester.bits()?.up_to(1);
+    tester.set_bits(span.first, &[false])?;
+    for unit in few_others(tester) {
+        silent_to(tester, unit, &pdu(5, span.first, 0xFF00))?;
+        silent_to(tester, unit, &write_bits(span.first, &[true], false))?;
+        tester.is_off(span)?;
     }
     Ok(())
 }
 
-fn other_units_write_words(bench: &mut Bench<'_>) -> Check {
-    let words = bench.words()?;
+fn other_units_write_words(tester: &mut Tester<'_>) -> Check {
+    let words = tester.words()?;
     let at = words.span.first;
-    bench.set_words(at, &[words.low])?;
-    for unit in few_others(bench) {
-        silent_to(bench, unit, &pdu(6, at, words.high))?;
-        silent_to(bench, unit, &write_words(at, &[words.high]))?;
-        bench.word_is(at, words.low)?;
+    tester.set_words(at, &[words.low])?;
+    for unit in few_others(tester) {
+        silent_to(tester, unit, &pdu(6, at, words.high))?;
+        silent_to(tester, unit, &write_words(at, &[words.high]))?;
+        tester.word_is(at, words.low)?;
     }
     Ok(())
 }
 
-fn broadcast_bits(bench: &mut Bench<'_>) -> Check {
-    let span = bench.bits()?.up_to(1);
+fn broadcast_bits(tester: &mut Tester<'_>) -> Check {
+    let span = tester.bits()?.up_to(1);
     for state in [true, false, true] {
         let value = if state { 0xFF00 } else { 0 };
         for request in [
             pdu(5, span.first, value),
             write_bits(span.first, &[state], false),
         ] {
-            if !bench.target.has(request[0]) {
+            if !tester.target.has(request[0]) {
                 continue;
             }
-            bench.set_bits(span.first, &[!state])?;
-            silent_to(bench, 0, &request)?;
+            tester.set_bits(span.first, &[!state])?;
+            silent_to(tester, 0, &request)?;
             let wanted = format!("the broadcast has made the coil {state}");
-            bench.bits_are(span, &[state], wanted)?;
+            tester.bits_are(span, &[state], wanted)?;
         }
     }
     Ok(())
 }
 
-fn broadcast_words(bench: &mut Bench<'_>) -> Check {
-    let words = bench.words()?;
+fn broadcast_words(tester: &mut Tester<'_>) -> Check {
+    let words = tester.words()?;
     let at = words.span.first;
     for value in [words.high, words.low] {
         for request in [
@@ -125,23 +125,23 @@ fn broadcast_words(bench: &mut Bench<'_>) -> Check {
             write_words(at, &[value]),
             [pdu(0x16, at, 0), value.to_be_bytes().to_vec()].concat(),
         ] {
-            if !bench.target.has(request[0]) {
+            if !tester.target.has(request[0]) {
                 continue;
             }
-            bench.set_words(at, &[words.other(value)])?;
-            silent_to(bench, 0, &request)?;
+            tester.set_words(at, &[words.other(value)])?;
+            silent_to(tester, 0, &request)?;
             let wanted = format!("the broadcast has made the register {value:04X}");
-            bench.words_are(words.span.up_to(1), &[value], wanted)?;
+            tester.words_are(words.span.up_to(1), &[value], wanted)?;
         }
     }
     Ok(())
 }
 
-fn broadcast_read(bench: &mut Bench<'_>) -> Check {
+fn broadcast_read(tester: &mut Tester<'_>) -> Check {
     for function in 1..=4 {
-        let readable = bench.target.readable(function);
+        let readable = tester.target.readable(function);
         let first = readable.first().map_or(0, |span| span.first);
-        silent_to(bench, 0, &pdu(function, first, 1))?;
+        silent_to(tester, 0, &pdu(function, first, 1))?;
     }
     for request in [
         vec![7],
@@ -150,12 +150,12 @@ fn broadcast_read(bench: &mut Bench<'_>) -> Check {
         vec![8, 0, 0, 1, 2],
         vec![0x2B, 0x0E, 1, 0],
     ] {
-        silent_to(bench, 0, &request)?;
+        silent_to(tester, 0, &request)?;
     }
-    bench.alive("broadcasts that only read")
+    tester.alive("broadcasts that only read")
 }
 
-fn nonsense(bench: &mut Bench<'_>) -> Check {
+fn nonsense(tester: &mut Tester<'_>) -> Check {
     for request in [
         vec![0x66],
         vec![0],
@@ -166,38 +166,38 @@ fn nonsense(bench: &mut Bench<'_>) -> Check {
         vec![0x0F, 0, 0, 0, 0, 0],
         vec![0x10, 0, 0, 0, 1, 3, 0, 0, 0],
     ] {
-        silent_to(bench, 0, &request)?;
+        silent_to(tester, 0, &request)?;
     }
-    bench.alive("broadcasts that make no sense")
+    tester.alive("broadcasts that make no sense")
 }
 
-fn broadcast_restart(bench: &mut Bench<'_>) -> Check {
-    bench.alive("the start of the case")?;
+fn broadcast_restart(tester: &mut Tester<'_>) -> Check {
+    tester.alive("the start of the case")?;
     for data in [[0, 0], [0xFF, 0]] {
-        let before = count(bench, 0x0B)?;
-        silent_to(bench, 0, &diagnose(1, &data))?;
+        let before = count(tester, 0x0B)?;
+        silent_to(tester, 0, &diagnose(1, &data))?;
         let wanted = before.wrapping_add(2);
         let text = format!("counter 0B goes on to {wanted}, with the broadcast and this request");
-        let after = count(bench, 0x0B)?;
-        bench.ensure(after == wanted, text)?;
+        let after = count(tester, 0x0B)?;
+        tester.ensure(after == wanted, text)?;
     }
     Ok(())
 }
 
-fn broadcast_listen_only(bench: &mut Bench<'_>) -> Check {
-    let entered = silent_to(bench, 0, &diagnose(4, &[0, 0])).and_then(|()| {
-        bench.alive("a broadcast 08/04: the mode is for the unit that is addressed")
+fn broadcast_listen_only(tester: &mut Tester<'_>) -> Check {
+    let entered = silent_to(tester, 0, &diagnose(4, &[0, 0])).and_then(|()| {
+        tester.alive("a broadcast 08/04: the mode is for the unit that is addressed")
     });
     if entered.is_err() {
         // End the mode, so that later cases are not affected.
-        bench.ask(&diagnose(1, &[0, 0]))?;
+        tester.ask(&diagnose(1, &[0, 0]))?;
     }
     entered
 }
 
-fn refused_writes(bench: &mut Bench<'_>) -> Check {
-    let span = bench.bits()?.up_to(1);
-    bench.set_bits(span.first, &[false])?;
+fn refused_writes(tester: &mut Tester<'_>) -> Check {
+    let span = tester.bits()?.up_to(1);
+    tester.set_bits(span.first, &[false])?;
     let mut wrong = write_bits(span.first, &[true], false);
     wrong[5] = 2;
     for request in [
@@ -206,11 +206,11 @@ fn refused_writes(bench: &mut Bench<'_>) -> Check {
         write_bits(span.first, &[true; 1968], true),
     ] {
         let beyond = request.len() > 200;
-        if beyond && bench.bits()?.len() >= 1968 {
+        if beyond && tester.bits()?.len() >= 1968 {
             continue;
         }
-        silent_to(bench, 0, &request)?;
-        bench.is_off(span)?;
+        silent_to(tester, 0, &request)?;
+        tester.is_off(span)?;
     }
     Ok(())
 }

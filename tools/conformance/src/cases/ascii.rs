@@ -4,13 +4,13 @@ use std::time::Duration;
 
 use modbus_line::Parity;
 
-use crate::bench::{Bench, apart};
 use crate::case::{Case, Check, Need, case};
 use crate::cases::damage::one_by_one;
 use crate::cases::dispatch::with_data;
 use crate::endpoint::Piece;
 use crate::frame::{Reply, ascii, lrc, rtu};
 use crate::points::diagnose;
+use crate::tester::{Tester, apart};
 
 const N: &[Need] = &[Need::Ascii];
 const S: &str = "V1.02 2.5.2.1";
@@ -40,149 +40,149 @@ pub(super) const CASES: &[Case] = &[
         &[Need::Ascii, Need::Function(8)], delimiter_refused).interpretation(),
 ];
 
-fn body(bench: &Bench<'_>) -> Vec<u8> {
-    [&[bench.unit()], &bench.target.ping[..]].concat()
+fn body(tester: &Tester<'_>) -> Vec<u8> {
+    [&[tester.unit()], &tester.target.ping[..]].concat()
 }
 
-fn bad_lrc(bench: &mut Bench<'_>) -> Check {
-    let body = body(bench);
+fn bad_lrc(tester: &mut Tester<'_>) -> Check {
+    let body = body(tester);
     for bit in 0..8 {
         let bad = ascii(&body, lrc(&body) ^ 1 << bit);
-        bench.silence_to(&bad, "the LRC is wrong")?;
+        tester.silence_to(&bad, "the LRC is wrong")?;
     }
-    bench.alive("frames with a wrong LRC")
+    tester.alive("frames with a wrong LRC")
 }
 
-fn before_colon(bench: &mut Bench<'_>) -> Check {
+fn before_colon(tester: &mut Tester<'_>) -> Check {
     for noise in [&b"0"[..], b"\r\n", b"0103", b"\x00\xFF", b"hello"] {
-        let frame = [noise, &bench.ping()].concat();
-        bench.answers(&[Piece::Bytes(frame)], "a reply to what follows the colon")?;
+        let frame = [noise, &tester.ping()].concat();
+        tester.answers(&[Piece::Bytes(frame)], "a reply to what follows the colon")?;
     }
     Ok(())
 }
 
-fn colon_restarts(bench: &mut Bench<'_>) -> Check {
+fn colon_restarts(tester: &mut Tester<'_>) -> Check {
     for open in [&b":"[..], b":0", b":0103", b":010300000001"] {
-        let frame = [open, &bench.ping()].concat();
+        let frame = [open, &tester.ping()].concat();
         let wanted = "a reply to what follows the last colon";
-        bench.answers(&[Piece::Bytes(frame)], wanted)?;
+        tester.answers(&[Piece::Bytes(frame)], wanted)?;
     }
     Ok(())
 }
 
-fn not_digits(bench: &mut Bench<'_>) -> Check {
-    let good = bench.ping();
+fn not_digits(tester: &mut Tester<'_>) -> Check {
+    let good = tester.ping();
     for wrong in [b'G', b' ', b'/', b'@', 0x00] {
         let mut bad = good.clone();
         bad[3] = wrong;
-        bench.silence_to(&bad, "a character is not a digit")?;
+        tester.silence_to(&bad, "a character is not a digit")?;
     }
     let mut odd = good.clone();
     odd.remove(3);
-    bench.silence_to(&odd, "an odd number of digits")?;
-    bench.silence_to(b":\r\n", "the frame is empty")?;
-    bench.silence_to(b":01FF\r\n", "an address alone")?;
-    bench.alive("invalid frames")
+    tester.silence_to(&odd, "an odd number of digits")?;
+    tester.silence_to(b":\r\n", "the frame is empty")?;
+    tester.silence_to(b":01FF\r\n", "an address alone")?;
+    tester.alive("invalid frames")
 }
 
-fn lower_case(bench: &mut Bench<'_>) -> Check {
+fn lower_case(tester: &mut Tester<'_>) -> Check {
     // These data have letters among their digits, whatever the unit's address is.
-    let function = super::dispatch::unknown_function(bench)?;
+    let function = super::dispatch::unknown_function(tester)?;
     let pdu = [function, 0xAB, 0xCD, 0xEF];
-    bench.exception(&pdu, 1)?;
-    let lower = bench.frame(&pdu).to_ascii_lowercase();
-    bench.silence_to(&lower, "the digits are in lower case")?;
-    bench.alive("a frame in lower case")
+    tester.exception(&pdu, 1)?;
+    let lower = tester.frame(&pdu).to_ascii_lowercase();
+    tester.silence_to(&lower, "the digits are in lower case")?;
+    tester.alive("a frame in lower case")
 }
 
-fn damaged(bench: &mut Bench<'_>) -> Check {
-    one_by_one(bench, Piece::BadStop)?;
-    if bench.endpoint.line().format.parity == Parity::None {
+fn damaged(tester: &mut Tester<'_>) -> Check {
+    one_by_one(tester, Piece::BadStop)?;
+    if tester.endpoint.line().format.parity == Parity::None {
         return Ok(());
     }
-    one_by_one(bench, Piece::BadParity)
+    one_by_one(tester, Piece::BadParity)
 }
 
-fn truncated(bench: &mut Bench<'_>) -> Check {
-    let good = bench.ping();
+fn truncated(tester: &mut Tester<'_>) -> Check {
+    let good = tester.ping();
     for cut in 1..good.len() {
-        bench.silence_to(&good[..cut], "the frame has no end")?;
-        bench.alive("a truncated frame")?;
+        tester.silence_to(&good[..cut], "the frame has no end")?;
+        tester.alive("a truncated frame")?;
     }
     Ok(())
 }
 
-fn with_gap(bench: &Bench<'_>, gap: Duration) -> [Piece; 3] {
-    let frame = bench.ping();
+fn with_gap(tester: &Tester<'_>, gap: Duration) -> [Piece; 3] {
+    let frame = tester.ping();
     let (first, rest) = frame.split_at(5);
     apart(first, gap, rest)
 }
 
-fn short_gap(bench: &mut Bench<'_>) -> Check {
-    for ms in [10, 100, bench.exact(980, 500)] {
-        let pieces = with_gap(bench, Duration::from_millis(ms));
-        bench.answers(&pieces, format!("a reply: a gap of {ms} ms is allowed"))?;
+fn short_gap(tester: &mut Tester<'_>) -> Check {
+    for ms in [10, 100, tester.exact(980, 500)] {
+        let pieces = with_gap(tester, Duration::from_millis(ms));
+        tester.answers(&pieces, format!("a reply: a gap of {ms} ms is allowed"))?;
     }
     Ok(())
 }
 
-fn long_gap(bench: &mut Bench<'_>) -> Check {
+fn long_gap(tester: &mut Tester<'_>) -> Check {
     for ms in [1050, 1500] {
-        let pieces = with_gap(bench, Duration::from_millis(ms));
-        bench.silence(&pieces, format!("a gap of {ms} ms is too long"))?;
-        bench.alive("a gap above a second")?;
+        let pieces = with_gap(tester, Duration::from_millis(ms));
+        tester.silence(&pieces, format!("a gap of {ms} ms is too long"))?;
+        tester.alive("a gap above a second")?;
     }
     Ok(())
 }
 
-fn longest(bench: &mut Bench<'_>) -> Check {
+fn longest(tester: &mut Tester<'_>) -> Check {
     // Unit, 253 bytes of PDU, LRC: 255 bytes as 510 digits, colon, CR and LF.
-    let (function, frame) = with_data(bench, 252);
-    let reply = bench.raw_due(&frame)?;
-    bench.ensure(
+    let (function, frame) = with_data(tester, 252);
+    let reply = tester.raw_due(&frame)?;
+    tester.ensure(
         frame.len() == 513 && reply.exception(function) == Some(1),
         "exception 01: a frame of 513 characters is valid",
     )
 }
 
-fn too_long(bench: &mut Bench<'_>) -> Check {
+fn too_long(tester: &mut Tester<'_>) -> Check {
     for data in [253, 254, 300, 600] {
-        let (_, frame) = with_data(bench, data);
-        bench.silence_to(&frame, "the frame is too long")?;
-        bench.alive("a frame that is too long")?;
+        let (_, frame) = with_data(tester, data);
+        tester.silence_to(&frame, "the frame is too long")?;
+        tester.alive("a frame that is too long")?;
     }
     Ok(())
 }
 
-fn rtu_frame(bench: &mut Bench<'_>) -> Check {
-    let frame = rtu(&body(bench));
+fn rtu_frame(tester: &mut Tester<'_>) -> Check {
+    let frame = rtu(&body(tester));
     for _ in 0..3 {
-        bench.silence_to(&frame, "the frame is an RTU frame")?;
+        tester.silence_to(&frame, "the frame is an RTU frame")?;
     }
-    bench.alive("RTU frames")
+    tester.alive("RTU frames")
 }
 
-fn delimiter(bench: &mut Bench<'_>) -> Check {
+fn delimiter(tester: &mut Tester<'_>) -> Check {
     let change = |to: u8| diagnose(3, &[to, 0]);
-    bench.reply_unless_lacking(&change(b'!'), "08/03")?;
-    let [new, back] = [bench.ping(), bench.frame(&change(b'\n'))].map(|mut frame| {
+    tester.reply_unless_lacking(&change(b'!'), "08/03")?;
+    let [new, back] = [tester.ping(), tester.frame(&change(b'\n'))].map(|mut frame| {
         frame.pop();
         frame.push(b'!');
         frame
     });
     // The reply may end in either character.
-    let answered = bench.raw_due(&new)? != Reply::Silence;
-    bench.raw(&back)?;
+    let answered = tester.raw_due(&new)? != Reply::Silence;
+    tester.raw(&back)?;
     let wanted = "a reply to a frame that ends in CR and the new character";
-    bench.ensure(answered, wanted)?;
-    bench.alive("the delimiter is LF again")
+    tester.ensure(answered, wanted)?;
+    tester.alive("the delimiter is LF again")
 }
 
-fn delimiter_refused(bench: &mut Bench<'_>) -> Check {
-    bench.reply_unless_lacking(&diagnose(3, b"\n\0"), "08/03")?;
+fn delimiter_refused(tester: &mut Tester<'_>) -> Check {
+    tester.reply_unless_lacking(&diagnose(3, b"\n\0"), "08/03")?;
     for data in [b":\0", b"\r\0", b"0\0", b"9\0", b"A\0", b"F\0", b"!\x01"] {
-        bench.exception(&diagnose(3, data), 3)?;
-        bench.alive("a refused delimiter")?;
+        tester.exception(&diagnose(3, data), 3)?;
+        tester.alive("a refused delimiter")?;
     }
     Ok(())
 }

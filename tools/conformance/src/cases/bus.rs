@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
-use crate::bench::{Bench, apart};
 use crate::case::{Case, Check, Need, case};
 use crate::endpoint::Piece;
 use crate::frame::{Reply, rtu};
 use crate::points::pdu;
+use crate::tester::{Tester, apart};
 
 const N: &[Need] = &[Need::Rtu];
 
@@ -28,8 +28,8 @@ pub(super) const CASES: &[Case] = &[
 ];
 
 /// Requests to other units, and their replies.
-fn traffic(bench: &Bench<'_>) -> Vec<Vec<u8>> {
-    let other = bench.other();
+fn traffic(tester: &Tester<'_>) -> Vec<Vec<u8>> {
+    let other = tester.other();
     [
         &[other, 1, 0, 0, 0, 8][..],
         &[other, 1, 1, 0x5A],
@@ -48,54 +48,54 @@ fn traffic(bench: &Bench<'_>) -> Vec<Vec<u8>> {
     .to_vec()
 }
 
-fn others_traffic(bench: &mut Bench<'_>) -> Check {
-    for frame in traffic(bench) {
-        bench.silence_to(&frame, "the frame is another unit's")?;
-        bench.alive("other units' traffic")?;
+fn others_traffic(tester: &mut Tester<'_>) -> Check {
+    for frame in traffic(tester) {
+        tester.silence_to(&frame, "the frame is another unit's")?;
+        tester.alive("other units' traffic")?;
     }
-    for frame in traffic(bench) {
-        bench.silence_to(&frame, "the frame is another unit's")?;
+    for frame in traffic(tester) {
+        tester.silence_to(&frame, "the frame is another unit's")?;
     }
-    bench.alive("a lot of other units' traffic")
+    tester.alive("a lot of other units' traffic")
 }
 
-fn others_truncated(bench: &mut Bench<'_>) -> Check {
-    for frame in traffic(bench) {
+fn others_truncated(tester: &mut Tester<'_>) -> Check {
+    for frame in traffic(tester) {
         let cuts = [1, 2, 3, frame.len() - 1];
         for cut in cuts.into_iter().filter(|cut| *cut < frame.len()) {
-            bench.silence_to(&frame[..cut], "the frame of another unit is cut")?;
+            tester.silence_to(&frame[..cut], "the frame of another unit is cut")?;
         }
-        bench.alive("other units' truncated traffic")?;
+        tester.alive("other units' truncated traffic")?;
         let mut bad = frame.clone();
         bad[1] ^= 4;
-        bench.silence_to(&bad, "the frame of another unit is damaged")?;
-        bench.alive("other units' damaged traffic")?;
+        tester.silence_to(&bad, "the frame of another unit is damaged")?;
+        tester.alive("other units' damaged traffic")?;
     }
     Ok(())
 }
 
-fn others_long(bench: &mut Bench<'_>) -> Check {
-    let other = bench.other();
+fn others_long(tester: &mut Tester<'_>) -> Check {
+    let other = tester.other();
     for words in [1, 2, 60, 123, 124, 125] {
         let data = vec![0x5A; usize::from(words) * 2];
         let body = [vec![other, 3, words * 2], data].concat();
-        bench.silence_to(&rtu(&body), "the frame is another unit's reply")?;
-        bench.alive(format!("another unit's reply of {words} registers"))?;
+        tester.silence_to(&rtu(&body), "the frame is another unit's reply")?;
+        tester.alive(format!("another unit's reply of {words} registers"))?;
     }
     Ok(())
 }
 
-fn right_after(bench: &mut Bench<'_>) -> Check {
-    let line = bench.endpoint.line();
+fn right_after(tester: &mut Tester<'_>) -> Check {
+    let line = tester.endpoint.line();
     let gap = line.t35_limits().most + line.bits(3).max(Duration::from_micros(20));
-    for frame in traffic(bench) {
-        bench.answers(
+    for frame in traffic(tester) {
+        tester.answers(
             &[
                 Piece::Bytes(frame.clone()),
                 Piece::Gap(gap),
                 Piece::Bytes(frame),
                 Piece::Gap(gap),
-                Piece::Bytes(bench.ping()),
+                Piece::Bytes(tester.ping()),
             ],
             format!("a reply, {gap:?} after other traffic"),
         )?;
@@ -103,62 +103,62 @@ fn right_after(bench: &mut Bench<'_>) -> Check {
     Ok(())
 }
 
-fn reply_is_no_request(bench: &mut Bench<'_>) -> Check {
-    let span = bench.bits()?.up_to(1);
-    bench.set_bits(span.first, &[false])?;
-    let other = bench.other();
+fn reply_is_no_request(tester: &mut Tester<'_>) -> Check {
+    let span = tester.bits()?.up_to(1);
+    tester.set_bits(span.first, &[false])?;
+    let other = tester.other();
     // A write to another unit and its echo, which are the same frame.
     let frame = rtu(&[&[other], &pdu(5, span.first, 0xFF00)[..]].concat());
     // A reply to a read whose data is a good request for this unit, including its CRC.
-    let inner = bench.frame(&pdu(5, span.first, 0xFF00));
+    let inner = tester.frame(&pdu(5, span.first, 0xFF00));
     let body = [&[other, 3, inner.len() as u8], &inner[..]].concat();
     for frame in [frame.clone(), frame, rtu(&body)] {
-        bench.silence_to(&frame, "the frame is another unit's")?;
+        tester.silence_to(&frame, "the frame is another unit's")?;
     }
-    bench.is_off(span)
+    tester.is_off(span)
 }
 
-fn stray_zero(bench: &mut Bench<'_>) -> Check {
+fn stray_zero(tester: &mut Tester<'_>) -> Check {
     for stray in [&[0][..], &[0, 0], &[0xFF]] {
-        let frame = [stray, &bench.ping()].concat();
-        let reply = bench.raw(&frame)?;
-        let right = reply == Reply::Silence || bench.is_pong(&reply);
-        bench.ensure(right, "silence, or the reply")?;
-        bench.alive("a stray byte in front of a request")?;
-        let silence = bench.endpoint.line().t35_limits().most * 2;
-        let apart = apart(stray, silence, &bench.ping());
+        let frame = [stray, &tester.ping()].concat();
+        let reply = tester.raw(&frame)?;
+        let right = reply == Reply::Silence || tester.is_pong(&reply);
+        tester.ensure(right, "silence, or the reply")?;
+        tester.alive("a stray byte in front of a request")?;
+        let silence = tester.endpoint.line().t35_limits().most * 2;
+        let apart = apart(stray, silence, &tester.ping());
         let wanted = "a reply: a silence separates the stray byte from the request";
-        bench.answers(&apart, wanted)?;
+        tester.answers(&apart, wanted)?;
     }
     Ok(())
 }
 
-fn own_echo(bench: &mut Bench<'_>) -> Check {
-    bench.endpoint.set_echo(true)?;
-    let result = echoed(bench);
-    bench.endpoint.set_echo(false)?;
+fn own_echo(tester: &mut Tester<'_>) -> Check {
+    tester.endpoint.set_echo(true)?;
+    let result = echoed(tester);
+    tester.endpoint.set_echo(false)?;
     result?;
-    bench.alive("replies that the unit received itself")
+    tester.alive("replies that the unit received itself")
 }
 
-fn echoed(bench: &mut Bench<'_>) -> Check {
-    let ping = bench.target.ping.clone();
+fn echoed(tester: &mut Tester<'_>) -> Check {
+    let ping = tester.target.ping.clone();
     for _ in 0..10 {
-        bench.reply(&ping)?;
+        tester.reply(&ping)?;
     }
     // Replies that are equal to their requests. A unit that treats its own reply as a request never stops answering.
     let mut echoes = Vec::new();
-    if bench.target.has(8) {
+    if tester.target.has(8) {
         echoes.push(vec![8, 0, 0, 1, 2]);
     }
-    let reads_and_writes = bench.target.has(5) && bench.target.has(1);
-    if let Some(span) = bench.target.bits.filter(|_| reads_and_writes) {
-        let now = bench.read_bits(span.up_to(1))?[0];
+    let reads_and_writes = tester.target.has(5) && tester.target.has(1);
+    if let Some(span) = tester.target.bits.filter(|_| reads_and_writes) {
+        let now = tester.read_bits(span.up_to(1))?[0];
         echoes.push(pdu(5, span.first, if now { 0xFF00 } else { 0 }));
     }
     for request in echoes {
         for _ in 0..5 {
-            bench.reply_is(&request, &request)?;
+            tester.reply_is(&request, &request)?;
         }
     }
     Ok(())

@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use register_map::{Module, codes::Command, configuration, points, state};
 
-use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case};
 use crate::points::{pdu, write_words};
+use crate::tester::Tester;
 
 const L: &[Need] = &[Need::Modio, Need::LockClosed, Need::Function(6)];
 
@@ -30,31 +30,31 @@ pub(super) const CASES: &[Case] = &[
         &[Need::Modio, Need::Config, Need::Exact, Need::Function(6)], response_delay),
 ];
 
-fn locked(bench: &mut Bench<'_>) -> Check {
-    let before = bench.read_word(configuration::RESPONSE_DELAY)?;
+fn locked(tester: &mut Tester<'_>) -> Check {
+    let before = tester.read_word(configuration::RESPONSE_DELAY)?;
     for value in [before, before ^ 1] {
-        bench.exception(&pdu(6, configuration::RESPONSE_DELAY, value), 6)?;
-        bench.exception(&write_words(configuration::RESPONSE_DELAY, &[value]), 6)?;
+        tester.exception(&pdu(6, configuration::RESPONSE_DELAY, value), 6)?;
+        tester.exception(&write_words(configuration::RESPONSE_DELAY, &[value]), 6)?;
     }
-    bench.word_is(configuration::RESPONSE_DELAY, before)
+    tester.word_is(configuration::RESPONSE_DELAY, before)
 }
 
-fn wrong_key(bench: &mut Bench<'_>) -> Check {
+fn wrong_key(tester: &mut Tester<'_>) -> Check {
     for key in [0, 1, 0x5A16, 0x175A, 0xFFFF] {
-        bench.exception(&pdu(6, configuration::KEY, key), 3)?;
+        tester.exception(&pdu(6, configuration::KEY, key), 3)?;
     }
-    let now = bench.read_word(configuration::KEY)?;
-    bench.ensure(now == 0, "KEY reads 0: the lock is still closed")
+    let now = tester.read_word(configuration::KEY)?;
+    tester.ensure(now == 0, "KEY reads 0: the lock is still closed")
 }
 
-fn value_first(bench: &mut Bench<'_>) -> Check {
+fn value_first(tester: &mut Tester<'_>) -> Check {
     let mut wrong = vec![
         (configuration::RESPONSE_DELAY, 1001),
         (configuration::FRAME_GAP, 1),
         (configuration::COMM_TIMEOUT, 36_001),
         (configuration::BETA, 1999),
     ];
-    if let Some(board) = bench.target.modio.and_then(|modio| modio.board) {
+    if let Some(board) = tester.target.modio.and_then(|modio| modio.board) {
         let ports = (1..=points::PORTS).filter(|port| board.chooses(*port));
         wrong.extend(ports.map(|port| {
             let known = board.has_slot(port);
@@ -63,14 +63,14 @@ fn value_first(bench: &mut Bench<'_>) -> Check {
         }));
     }
     for (register, value) in wrong {
-        let before = bench.read_word(register)?;
-        bench.exception(&pdu(6, register, value), 3)?;
-        bench.word_is(register, before)?;
+        let before = tester.read_word(register)?;
+        tester.exception(&pdu(6, register, value), 3)?;
+        tester.word_is(register, before)?;
     }
     Ok(())
 }
 
-fn read_only(bench: &mut Bench<'_>) -> Check {
+fn read_only(tester: &mut Tester<'_>) -> Check {
     for register in [
         state::PRODUCT_CODE,
         state::UNIT_ADDRESS,
@@ -79,55 +79,56 @@ fn read_only(bench: &mut Bench<'_>) -> Check {
         state::MODULE_IN_FORCE,
         state::BUS_MESSAGES,
     ] {
-        bench.exception(&pdu(6, register, 0), 2)?;
-        bench.exception(&write_words(register, &[0]), 2)?;
+        tester.exception(&pdu(6, register, 0), 2)?;
+        tester.exception(&write_words(register, &[0]), 2)?;
     }
     Ok(())
 }
 
-fn command(bench: &mut Bench<'_>) -> Check {
-    let now = bench.read_word(configuration::COMMAND)?;
-    bench.ensure(now == 0, "COMMAND reads 0")?;
+fn command(tester: &mut Tester<'_>) -> Check {
+    let now = tester.read_word(configuration::COMMAND)?;
+    tester.ensure(now == 0, "COMMAND reads 0")?;
     for value in [0, 7, 0xB006, 0xFFFF] {
-        bench.exception(&pdu(6, configuration::COMMAND, value), 3)?;
+        tester.exception(&pdu(6, configuration::COMMAND, value), 3)?;
     }
-    if bench.target.allow_config {
-        bench.unlock()?;
+    if tester.target.allow_config {
+        tester.unlock()?;
         let clear_flag = Command::ClearWatchdogFlag.code();
         let request = pdu(6, configuration::COMMAND, clear_flag);
-        bench.reply_is(&request, &request)?;
+        tester.reply_is(&request, &request)?;
     }
-    let now = bench.read_word(configuration::COMMAND)?;
-    bench.ensure(now == 0, "COMMAND reads 0 after a command")
+    let now = tester.read_word(configuration::COMMAND)?;
+    tester.ensure(now == 0, "COMMAND reads 0 after a command")
 }
 
-fn all_or_nothing(bench: &mut Bench<'_>) -> Check {
-    bench.unlock()?;
+fn all_or_nothing(tester: &mut Tester<'_>) -> Check {
+    tester.unlock()?;
     let at = configuration::COMM_TIMEOUT;
-    let before = bench.reply(&pdu(3, at, 4))?;
-    bench.exception(&write_words(at, &[700, 1, 1, 0]), 3)?;
-    bench.exception(&write_words(at, &[700, 1, 0, 2]), 3)?;
-    let now = bench.reply(&pdu(3, at, 4))?;
-    bench.ensure(now == before, "the four registers are unchanged")
+    let before = tester.reply(&pdu(3, at, 4))?;
+    tester.exception(&write_words(at, &[700, 1, 1, 0]), 3)?;
+    tester.exception(&write_words(at, &[700, 1, 0, 2]), 3)?;
+    let now = tester.reply(&pdu(3, at, 4))?;
+    tester.ensure(now == before, "the four registers are unchanged")
 }
 
-fn response_delay(bench: &mut Bench<'_>) -> Check {
-    bench.unlock()?;
-    let before = bench.read_word(configuration::RESPONSE_DELAY)?;
-    let patience = bench.patience;
-    bench.patience.reply += Duration::from_millis(200);
+fn response_delay(tester: &mut Tester<'_>) -> Check {
+    tester.unlock()?;
+    let before = tester.read_word(configuration::RESPONSE_DELAY)?;
+    let patience = tester.patience;
+    tester.patience.reply += Duration::from_millis(200);
     let mut result = Ok(());
     for ms in [1, 20, 100] {
         let request = pdu(6, configuration::RESPONSE_DELAY, ms);
-        result = result.and_then(|()| bench.reply_is(&request, &request));
-        result = result.and_then(|()| bench.alive("a new RESPONSE_DELAY"));
-        let least = bench.endpoint.line().t35_limits().least + Duration::from_millis(u64::from(ms));
-        let took = bench.turnaround();
+        result = result.and_then(|()| tester.reply_is(&request, &request));
+        result = result.and_then(|()| tester.alive("a new RESPONSE_DELAY"));
+        let least =
+            tester.endpoint.line().t35_limits().least + Duration::from_millis(u64::from(ms));
+        let took = tester.turnaround();
         let right = took >= least && took < least + Duration::from_millis(3);
         let wanted = format!("a reply {least:?} after the request, not {took:?}");
-        result = result.and_then(|()| bench.ensure(right, wanted));
+        result = result.and_then(|()| tester.ensure(right, wanted));
     }
-    bench.reply(&pdu(6, configuration::RESPONSE_DELAY, before))?;
-    bench.patience = patience;
+    tester.reply(&pdu(6, configuration::RESPONSE_DELAY, before))?;
+    tester.patience = patience;
     result
 }

@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use crate::bench::{Bench, damaged_at};
 use crate::case::{Case, Check, Need, case};
 use crate::endpoint::Piece;
 use crate::frame::Reply;
+use crate::tester::{Tester, damaged_at};
 
 const N: &[Need] = &[Need::Rtu, Need::Faults];
 
@@ -26,71 +26,71 @@ pub(super) const CASES: &[Case] = &[
 ];
 
 /// Damages each character of a request in turn. The unit is silent to that request, and answers the next one.
-pub(super) fn one_by_one(bench: &mut Bench<'_>, damaged: fn(u8) -> Piece) -> Check {
-    let frame = bench.ping();
+pub(super) fn one_by_one(tester: &mut Tester<'_>, damaged: fn(u8) -> Piece) -> Check {
+    let frame = tester.ping();
     for index in 0..frame.len() {
         let pieces = damaged_at(&frame, index, damaged);
-        bench.silence(&pieces, "a damaged character spoils its frame")?;
-        bench.alive("a damaged character")?;
+        tester.silence(&pieces, "a damaged character spoils its frame")?;
+        tester.alive("a damaged character")?;
     }
     Ok(())
 }
 
-fn framing_error(bench: &mut Bench<'_>) -> Check {
-    one_by_one(bench, Piece::BadStop)
+fn framing_error(tester: &mut Tester<'_>) -> Check {
+    one_by_one(tester, Piece::BadStop)
 }
 
-fn parity_error(bench: &mut Bench<'_>) -> Check {
-    one_by_one(bench, Piece::BadParity)
+fn parity_error(tester: &mut Tester<'_>) -> Check {
+    one_by_one(tester, Piece::BadParity)
 }
 
-fn damaged_write(bench: &mut Bench<'_>) -> Check {
-    let span = bench.bits()?.up_to(1);
-    bench.set_bits(span.first, &[false])?;
+fn damaged_write(tester: &mut Tester<'_>) -> Check {
+    let span = tester.bits()?.up_to(1);
+    tester.set_bits(span.first, &[false])?;
     let [high, low] = span.first.to_be_bytes();
-    let frame = bench.target.mode.frame(0, &[5, high, low, 0xFF, 0]);
+    let frame = tester.target.mode.frame(0, &[5, high, low, 0xFF, 0]);
     for index in 0..frame.len() {
         let pieces = damaged_at(&frame, index, Piece::BadStop);
-        bench.silence(&pieces, "a broadcast")?;
+        tester.silence(&pieces, "a broadcast")?;
     }
-    bench.is_off(span)
+    tester.is_off(span)
 }
 
-fn line_break(bench: &mut Bench<'_>) -> Check {
+fn line_break(tester: &mut Tester<'_>) -> Check {
     for bits in [10, 12, 15] {
-        bench.silence(&[Piece::Break(bits)], "a break is no request")?;
-        bench.alive("a break")?;
+        tester.silence(&[Piece::Break(bits)], "a break is no request")?;
+        tester.alive("a break")?;
     }
-    bench.silence(
+    tester.silence(
         &[Piece::Break(15), Piece::Break(15), Piece::Break(15)],
         "breaks are no request",
     )?;
-    bench.alive("breaks")
+    tester.alive("breaks")
 }
 
-fn glitch(bench: &mut Bench<'_>) -> Check {
-    let bit = bench.endpoint.line().bits(1);
-    let apart = Piece::Gap(bench.endpoint.line().t35_limits().most * 2 + bit * 12);
+fn glitch(tester: &mut Tester<'_>) -> Check {
+    let bit = tester.endpoint.line().bits(1);
+    let apart = Piece::Gap(tester.endpoint.line().t35_limits().most * 2 + bit * 12);
     for width in [Duration::from_micros(1), bit / 20, bit / 4, bit * 2 / 5] {
         let width = width.max(Duration::from_nanos(100));
-        let ping = Piece::Bytes(bench.ping());
+        let ping = Piece::Bytes(tester.ping());
         let wanted = format!("a reply after a glitch of {width:?}");
-        bench.answers(&[Piece::Glitch(width), apart.clone(), ping], wanted)?;
+        tester.answers(&[Piece::Glitch(width), apart.clone(), ping], wanted)?;
     }
     Ok(())
 }
 
 /// Sends a request and pulses after it. Returns the reply, and the time from the end of the request to the moment
 /// when the unit switches its driver on. Pulses during the reply would hide its first start bit.
-fn turnaround(bench: &mut Bench<'_>, pulses: &[Piece]) -> Check<(Reply, Duration)> {
-    let frame = bench.ping();
-    let end = bench.endpoint.now() + bench.endpoint.line().characters(frame.len());
-    bench.endpoint.take_driver_edges()?;
-    let reply = bench.exchange(&[&[Piece::Bytes(frame)], pulses].concat())?;
-    let edges = bench.endpoint.take_driver_edges()?;
+fn turnaround(tester: &mut Tester<'_>, pulses: &[Piece]) -> Check<(Reply, Duration)> {
+    let frame = tester.ping();
+    let end = tester.endpoint.now() + tester.endpoint.line().characters(frame.len());
+    tester.endpoint.take_driver_edges()?;
+    let reply = tester.exchange(&[&[Piece::Bytes(frame)], pulses].concat())?;
+    let edges = tester.endpoint.take_driver_edges()?;
     match edges.first() {
         Some((on, true)) => Ok((reply, on.saturating_sub(end))),
-        _ => bench.fail("a reply: a short pulse is no character"),
+        _ => tester.fail("a reply: a short pulse is no character"),
     }
 }
 
@@ -121,29 +121,30 @@ const MILLISECOND: Duration = Duration::from_millis(1);
 /// Other work of the unit, such as the scan of its modules, holds up replies that are due at the same instant, whether
 /// there are pulses or not. Usually it recurs every millisecond. Pulses that delay a reply delay it at any instant.
 fn least_turnaround(
-    bench: &mut Bench<'_>,
+    tester: &mut Tester<'_>,
     pulses: &[Piece],
     most: Duration,
 ) -> Check<(Reply, Duration)> {
-    let begun = bench.endpoint.now();
-    let mut last = turnaround(bench, pulses)?;
+    let begun = tester.endpoint.now();
+    let mut last = turnaround(tester, pulses)?;
     for n in 1..TRIES {
         if last.1 <= most {
             break;
         }
-        let passed = bench.endpoint.now().saturating_sub(begun).as_nanos() % MILLISECOND.as_nanos();
-        bench.rest(MILLISECOND + SHIFT * n - Duration::from_nanos(passed as u64))?;
-        last = turnaround(bench, pulses)?;
+        let passed =
+            tester.endpoint.now().saturating_sub(begun).as_nanos() % MILLISECOND.as_nanos();
+        tester.rest(MILLISECOND + SHIFT * n - Duration::from_nanos(passed as u64))?;
+        last = turnaround(tester, pulses)?;
     }
     Ok(last)
 }
 
-fn noise_behind(bench: &mut Bench<'_>) -> Check {
-    let line = bench.endpoint.line();
+fn noise_behind(tester: &mut Tester<'_>) -> Check {
+    let line = tester.endpoint.line();
     let bit = line.bits(1);
     let mut undisturbed = Duration::MAX;
     for _ in 0..5 {
-        undisturbed = undisturbed.min(turnaround(bench, &[])?.1);
+        undisturbed = undisturbed.min(turnaround(tester, &[])?.1);
     }
     let most = undisturbed + line.characters(1) + bit + BUSY;
     let silence = line.t35_limits().least;
@@ -162,19 +163,19 @@ fn noise_behind(bench: &mut Bench<'_>) -> Check {
                 // Pulses that end before the reply may start, and pulses that continue while it is due.
                 for last in [silence - bit * 3, most + line.characters(2)] {
                     let pulses = train(width, first, spacing, last);
-                    let (reply, took) = least_turnaround(bench, &pulses, most)?;
-                    bench.ensure(
+                    let (reply, took) = least_turnaround(tester, &pulses, most)?;
+                    tester.ensure(
                         took <= most,
                         format!(
                             "a reply {most:?} after the request or earlier, not {took:?}: without pulses it takes {undisturbed:?}"
                         ),
                     )?;
                     // Pulses during the reply damage the reply at the master.
-                    let right = bench.is_pong(&reply) || last > silence;
-                    bench.ensure(right, "a good reply")?;
+                    let right = tester.is_pong(&reply) || last > silence;
+                    tester.ensure(right, "a good reply")?;
                 }
             }
         }
     }
-    bench.alive("pulses after requests")
+    tester.alive("pulses after requests")
 }

@@ -1,8 +1,8 @@
 //! Function codes that a unit does not have.
 
-use crate::bench::Bench;
 use crate::case::{Case, Check, Stop, case};
 use crate::frame::Reply;
+use crate::tester::Tester;
 
 #[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
@@ -18,9 +18,9 @@ pub(super) const CASES: &[Case] = &[
 
 /// Functions that the unit does not have. On other devices than a modio only codes that no maker is known to use,
 /// because the effect of a maker's own function is unknown.
-pub(super) fn unknown_functions(bench: &Bench<'_>) -> Vec<u8> {
-    let lacking = |function: &u8| !bench.target.has(*function);
-    if bench.target.modio.is_some() {
+pub(super) fn unknown_functions(tester: &Tester<'_>) -> Vec<u8> {
+    let lacking = |function: &u8| !tester.target.has(*function);
+    if tester.target.modio.is_some() {
         (1..=0x7F).filter(lacking).collect()
     } else {
         let unassigned = [0x19, 0x2C, 0x30, 0x3F, 0x4A, 0x6F];
@@ -29,54 +29,54 @@ pub(super) fn unknown_functions(bench: &Bench<'_>) -> Vec<u8> {
 }
 
 /// Returns a function that the unit does not have. Without one the case is skipped.
-pub(super) fn unknown_function(bench: &Bench<'_>) -> Check<u8> {
-    let one = unknown_functions(bench).pop();
+pub(super) fn unknown_function(tester: &Tester<'_>) -> Check<u8> {
+    let one = unknown_functions(tester).pop();
     one.ok_or_else(|| Stop::Skip("every function exists".to_owned()))
 }
 
 /// Returns a function that the unit does not have, and a good frame of a request for it with this number of data
 /// bytes.
-pub(super) fn with_data(bench: &Bench<'_>, data: usize) -> (u8, Vec<u8>) {
-    let function = unknown_functions(bench).pop().unwrap_or(0x6F);
+pub(super) fn with_data(tester: &Tester<'_>, data: usize) -> (u8, Vec<u8>) {
+    let function = unknown_functions(tester).pop().unwrap_or(0x6F);
     let pdu = [vec![function], vec![0x33; data]].concat();
-    (function, bench.frame(&pdu))
+    (function, tester.frame(&pdu))
 }
 
-fn unknown(bench: &mut Bench<'_>) -> Check {
-    for function in unknown_functions(bench) {
-        bench.exception(&[function], 1)?;
+fn unknown(tester: &mut Tester<'_>) -> Check {
+    for function in unknown_functions(tester) {
+        tester.exception(&[function], 1)?;
     }
-    for function in unknown_functions(bench).into_iter().step_by(9) {
-        bench.exception(&[function, 0, 0, 0, 1], 1)?;
+    for function in unknown_functions(tester).into_iter().step_by(9) {
+        tester.exception(&[function, 0, 0, 0, 1], 1)?;
     }
     Ok(())
 }
 
-fn longest(bench: &mut Bench<'_>) -> Check {
-    let Some(function) = unknown_functions(bench).pop() else {
+fn longest(tester: &mut Tester<'_>) -> Check {
+    let Some(function) = unknown_functions(tester).pop() else {
         return Ok(());
     };
     let pdu = [vec![function], vec![0x33; 252]].concat();
-    bench.exception(&pdu, 1)
+    tester.exception(&pdu, 1)
 }
 
-fn not_functions(bench: &mut Bench<'_>) -> Check {
+fn not_functions(tester: &mut Tester<'_>) -> Check {
     for function in [0, 0x80, 0x81, 0x83, 0x86, 0x90, 0xAB, 0xC1, 0xFE, 0xFF] {
         for data in [&[][..], &[0, 0, 0, 1], &[2]] {
-            let reply = bench.ask(&[&[function], data].concat())?;
+            let reply = tester.ask(&[&[function], data].concat())?;
             let refused = Reply::Pdu(vec![function | 0x80, 1]);
             let right = reply == Reply::Silence || reply == refused;
-            bench.ensure(right, "silence, or exception 01")?;
+            tester.ensure(right, "silence, or exception 01")?;
         }
     }
-    bench.alive("invalid function codes")
+    tester.alive("invalid function codes")
 }
 
-fn elsewhere(bench: &mut Bench<'_>) -> Check {
-    let other = bench.other();
+fn elsewhere(tester: &mut Tester<'_>) -> Check {
+    let other = tester.other();
     for function in [0x41, 0x65, 0x00, 0x80] {
-        let silent = bench.ask_unit(other, &[function, 1, 2, 3])? == Reply::Silence;
-        bench.ensure(silent, "silence: the request is for another unit")?;
+        let silent = tester.ask_unit(other, &[function, 1, 2, 3])? == Reply::Silence;
+        tester.ensure(silent, "silence: the request is for another unit")?;
     }
     Ok(())
 }

@@ -13,13 +13,13 @@ use register_map::state;
 use serde_json::{Value, json};
 
 use super::timing::silence;
-use crate::bench::Bench;
 use crate::case::{Case, Check, Failure, Need, Part, Stop, parts, skip};
 use crate::endpoint::{Broken, Piece};
 use crate::frame::Reply;
 use crate::hil::spread::Spread;
 use crate::points::pdu;
 use crate::rate::tour;
+use crate::tester::Tester;
 
 #[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
@@ -37,38 +37,38 @@ const UNSETTLED: u16 = state::status::UNSAVED | state::status::RESTART_NEEDED;
 const GIVE_UP: u32 = 20;
 
 /// Measures at each rate, and restores the rate.
-fn each_rate(bench: &mut Bench<'_>, done: &mut dyn FnMut(Part)) -> Check {
-    let home = bench.endpoint.line();
-    let stops = lines(bench);
+fn each_rate(tester: &mut Tester<'_>, done: &mut dyn FnMut(Part)) -> Check {
+    let home = tester.endpoint.line();
+    let stops = lines(tester);
     if stops.iter().any(|line| *line != home) {
-        may_change_rate(bench, home)?;
+        may_change_rate(tester, home)?;
     }
-    let toured = tour(bench, stops, |bench| {
-        bench.go_on()?;
-        let name = bench.endpoint.line().to_string();
-        done(bench.part(name, |bench, part| {
-            let tally = measure(bench)?;
+    let toured = tour(tester, stops, |tester| {
+        tester.go_on()?;
+        let name = tester.endpoint.line().to_string();
+        done(tester.part(name, |tester, part| {
+            let tally = measure(tester)?;
             part.note = tally.to_string();
             part.measured = tally.json();
-            tally.judge(bench.target.hil.limit)
+            tally.judge(tester.target.hil.limit)
         })?);
         Ok(())
     });
-    let here = bench.endpoint.line();
+    let here = tester.endpoint.line();
     match toured {
         Err(why) if here != home => Err(Stop::Broken(Broken(format!(
             "the unit could not be set back to {home}; it last answered at {here}: {why}"
         )))),
         // The port does not have a rate that the user asks for.
-        Err(Stop::Skip(why)) if bench.go_on().is_ok() => Err(Stop::Broken(Broken(why))),
+        Err(Stop::Skip(why)) if tester.go_on().is_ok() => Err(Stop::Broken(Broken(why))),
         toured => toured,
     }
 }
 
 /// Returns the rates to measure at.
-fn lines(bench: &Bench<'_>) -> Vec<LineFormat> {
-    let home = bench.endpoint.line();
-    let rates = bench.target.hil.rates.iter();
+fn lines(tester: &Tester<'_>) -> Vec<LineFormat> {
+    let home = tester.endpoint.line();
+    let rates = tester.target.hil.rates.iter();
     match rates
         .map(|baud| LineFormat {
             baud: *baud,
@@ -82,23 +82,23 @@ fn lines(bench: &Bench<'_>) -> Vec<LineFormat> {
 }
 
 /// Returns the shortest time that the requests take, all rates together.
-pub fn least(bench: &Bench<'_>) -> Duration {
-    let frame = bench.frame(&echo(0)).len();
+pub fn least(tester: &Tester<'_>) -> Duration {
+    let frame = tester.frame(&echo(0)).len();
     let once = |line: &LineFormat| line.characters(2 * frame) + line.t35() * 2;
-    let each: Duration = lines(bench).iter().map(once).sum();
-    each * bench.target.hil.requests
+    let each: Duration = lines(tester).iter().map(once).sum();
+    each * tester.target.hil.requests
 }
 
 /// Checks that this unit's rate can be changed and restored without side effects.
-fn may_change_rate(bench: &mut Bench<'_>, home: LineFormat) -> Check {
+fn may_change_rate(tester: &mut Tester<'_>, home: LineFormat) -> Check {
     let refused = |why: String| Err(Stop::Broken(Broken(format!("--rates: {why}"))));
-    if !bench.endpoint.abilities().set_line {
+    if !tester.endpoint.abilities().set_line {
         return refused("the line must be a serial port: a socket has no rate".to_owned());
     }
-    if bench.unit() == RECOVERY {
+    if tester.unit() == RECOVERY {
         return refused("in recovery mode the unit stays at 9600 8N2".to_owned());
     }
-    let status = bench.read_word(state::STATUS)?;
+    let status = tester.read_word(state::STATUS)?;
     if status & UNSETTLED != 0 {
         return refused(format!(
             "the unit has settings that are not saved, or that wait for a restart (status {status:#06x}): \
@@ -137,9 +137,9 @@ fn echo(number: u16) -> Vec<u8> {
 }
 
 /// Sends the requests, each as soon as the line allows. Ends early when the user ends the run.
-fn measure(bench: &mut Bench<'_>) -> Check<Tally> {
-    let requests = bench.target.hil.requests;
-    let line = bench.endpoint.line();
+fn measure(tester: &mut Tester<'_>) -> Check<Tally> {
+    let requests = tester.target.hil.requests;
+    let line = tester.endpoint.line();
     let mut tally = Tally {
         line,
         sent: 0,
@@ -148,29 +148,29 @@ fn measure(bench: &mut Bench<'_>) -> Check<Tally> {
         given_up: false,
         example: None,
         spread: None,
-        least: silence(bench)?,
+        least: silence(tester)?,
     };
     let mut times = Vec::new();
     let mut lost_in_a_row = 0;
-    while tally.sent < requests && bench.go_on().is_ok() {
+    while tally.sent < requests && tester.go_on().is_ok() {
         let request = echo(tally.sent as u16);
-        let frame = bench.frame(&request);
+        let frame = tester.frame(&request);
         let length = frame.len();
-        let begin = bench.endpoint.now();
-        let reply = bench.exchange_until(&[Piece::Bytes(frame)], length)?;
+        let begin = tester.endpoint.now();
+        let reply = tester.exchange_until(&[Piece::Bytes(frame)], length)?;
         tally.sent += 1;
         let lost = reply == Reply::Silence;
         lost_in_a_row = if lost { lost_in_a_row + 1 } else { 0 };
         if reply == Reply::Pdu(request) {
-            if let Some(last) = bench.received.last() {
+            if let Some(last) = tester.received.last() {
                 let whole = begin + line.characters(2 * length);
-                times.push(bench.exact(bench.turnaround(), last.end.saturating_sub(whole)));
+                times.push(tester.exact(tester.turnaround(), last.end.saturating_sub(whole)));
             }
         } else {
             tally.lost += u32::from(lost);
             tally.wrong += u32::from(!lost);
             if let (None, Err(Stop::Fail(failure))) =
-                (&tally.example, bench.fail::<()>("the request, echoed"))
+                (&tally.example, tester.fail::<()>("the request, echoed"))
             {
                 tally.example = Some(failure);
             }
@@ -179,7 +179,7 @@ fn measure(bench: &mut Bench<'_>) -> Check<Tally> {
             tally.given_up = true;
             break;
         }
-        bench.rest(line.t35())?;
+        tester.rest(line.t35())?;
     }
     tally.spread = Spread::of(times);
     Ok(tally)

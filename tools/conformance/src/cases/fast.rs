@@ -4,10 +4,10 @@ use modbus_line::fast::{
     ADDRESS, FUNCTION, Packet, Priority, Reply, Request, Setting, are_on, kind, settings,
 };
 
-use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case, skip};
 use crate::frame::{self, rtu};
 use crate::points::pdu;
+use crate::tester::Tester;
 
 const N: &[Need] = &[Need::Rtu];
 /// Scans end after this number of units.
@@ -31,28 +31,28 @@ pub(super) const CASES: &[Case] = &[
 ];
 
 /// Skips the case if the unit does not have function 70.
-fn claimed(bench: &mut Bench<'_>) -> Check {
+fn claimed(tester: &mut Tester<'_>) -> Check {
     let nothing = settings(&[]);
-    match bench.ask_due(&nothing)? {
+    match tester.ask_due(&nothing)? {
         frame::Reply::Pdu(reply) if reply == nothing => Ok(()),
         reply if reply == frame::Reply::Silence || reply.exception(FUNCTION) == Some(1) => {
             skip("the unit does not have function 70")
         }
-        _ => bench.fail("the settings of no point, or exception 01"),
+        _ => tester.fail("the settings of no point, or exception 01"),
     }
 }
 
 /// Sends a request to all units. Returns the reply, if there is one.
-fn ask(bench: &mut Bench<'_>, request: &Request) -> Check<Option<Reply>> {
-    let (_, wait) = request.longest_wait(bench.endpoint.line());
-    let patience = bench.patience;
+fn ask(tester: &mut Tester<'_>, request: &Request) -> Check<Option<Reply>> {
+    let (_, wait) = request.longest_wait(tester.endpoint.line());
+    let patience = tester.patience;
     // An arbitration has longer silences than the silence that ends a reply.
-    bench.patience.reply += wait;
-    bench.patience.quiet = bench.patience.quiet.max(wait);
-    let received = bench.raw_due(&bench.target.mode.frame(ADDRESS, &request.pdu()));
-    bench.patience = patience;
+    tester.patience.reply += wait;
+    tester.patience.quiet = tester.patience.quiet.max(wait);
+    let received = tester.raw_due(&tester.target.mode.frame(ADDRESS, &request.pdu()));
+    tester.patience = patience;
     received?;
-    let bytes: Vec<u8> = bench
+    let bytes: Vec<u8> = tester
         .received
         .iter()
         .map(|received| received.byte)
@@ -61,71 +61,71 @@ fn ask(bench: &mut Bench<'_>, request: &Request) -> Check<Option<Reply>> {
 }
 
 /// Scans the line. Returns the serial number of the unit.
-fn find(bench: &mut Bench<'_>) -> Check<u32> {
+fn find(tester: &mut Tester<'_>) -> Check<u32> {
     let mut found = None;
     let mut request = Request::StartScan;
     for _ in 0..MOST_UNITS {
-        match ask(bench, &request)? {
-            Some(Reply::Found { serial, unit }) if unit == bench.unit() => {
-                bench.ensure(found.is_none(), "the unit is found once")?;
+        match ask(tester, &request)? {
+            Some(Reply::Found { serial, unit }) if unit == tester.unit() => {
+                tester.ensure(found.is_none(), "the unit is found once")?;
                 found = Some(serial);
             }
             Some(Reply::Found { .. }) => {}
             Some(Reply::NoneLeft) => {
-                return found.map_or_else(|| bench.fail("the unit is found"), Ok);
+                return found.map_or_else(|| tester.fail("the unit is found"), Ok);
             }
-            _ => return bench.fail("a unit that is found, or that none is left"),
+            _ => return tester.fail("a unit that is found, or that none is left"),
         }
         request = Request::ContinueScan;
     }
-    bench.fail("the scan ends")
+    tester.fail("the scan ends")
 }
 
-fn scan(bench: &mut Bench<'_>) -> Check {
-    claimed(bench)?;
-    let serial = find(bench)?;
-    let is_end = ask(bench, &Request::ContinueScan)? == Some(Reply::NoneLeft);
-    bench.ensure(is_end, "no unit is left, again")?;
-    let again = find(bench)?;
-    bench.ensure(again == serial, "the same serial number in the next scan")
+fn scan(tester: &mut Tester<'_>) -> Check {
+    claimed(tester)?;
+    let serial = find(tester)?;
+    let is_end = ask(tester, &Request::ContinueScan)? == Some(Reply::NoneLeft);
+    tester.ensure(is_end, "no unit is left, again")?;
+    let again = find(tester)?;
+    tester.ensure(again == serial, "the same serial number in the next scan")
 }
 
-fn by_serial(bench: &mut Bench<'_>) -> Check {
-    claimed(bench)?;
-    let serial = find(bench)?;
+fn by_serial(tester: &mut Tester<'_>) -> Check {
+    claimed(tester)?;
+    let serial = find(tester)?;
     let inside = |pdu: &[u8]| Request::BySerial {
         serial,
         pdu: pdu.to_vec(),
     };
-    let ping = bench.target.ping.clone();
-    let by_address = bench.reply(&ping)?;
-    let by_serial = ask(bench, &inside(&ping))?;
+    let ping = tester.target.ping.clone();
+    let by_address = tester.reply(&ping)?;
+    let by_serial = ask(tester, &inside(&ping))?;
     // The value of an input may have changed.
     let is_alike = matches!(by_serial, Some(Reply::Pdu(pdu)) if pdu[0] == ping[0] && pdu.len() == by_address.len());
-    bench.ensure(is_alike, "a reply of the same function and length")?;
+    tester.ensure(is_alike, "a reply of the same function and length")?;
     let refused = pdu(3, 0xFFFF, 0);
-    bench.exception(&refused, 3)?;
-    let by_serial = ask(bench, &inside(&refused))?;
+    tester.exception(&refused, 3)?;
+    let by_serial = ask(tester, &inside(&refused))?;
     let wanted = vec![0x83, 3];
-    bench.ensure(
+    tester.ensure(
         by_serial == Some(Reply::Pdu(wanted)),
         "exception 03 to function 03",
     )
 }
 
-fn other_serial(bench: &mut Bench<'_>) -> Check {
-    claimed(bench)?;
-    let other = find(bench)? ^ 0x4000;
+fn other_serial(tester: &mut Tester<'_>) -> Check {
+    claimed(tester)?;
+    let other = find(tester)? ^ 0x4000;
     let request = Request::BySerial {
         serial: other,
-        pdu: bench.target.ping.clone(),
+        pdu: tester.target.ping.clone(),
     };
-    let frame = bench.target.mode.frame(ADDRESS, &request.pdu());
-    bench.silence_to(&frame, "the request is for another serial number")
+    let frame = tester.target.mode.frame(ADDRESS, &request.pdu());
+    tester.silence_to(&frame, "the request is for another serial number")
 }
 
-fn unknown_to_all(bench: &mut Bench<'_>) -> Check {
-    claimed(bench)?;
+fn unknown_to_all(tester: &mut Tester<'_>) -> Check {
+    claimed(tester)?;
     let subs = [0, 5, 7, 0x0F, 0x13, 0x19, 0x20, 0x7F, 0x80, 0xFF];
     let unknown = subs.map(|sub| vec![FUNCTION, sub]);
     let lengths = [
@@ -139,34 +139,34 @@ fn unknown_to_all(bench: &mut Bench<'_>) -> Check {
     let lengths = lengths.map(|data| [&[FUNCTION], data].concat());
     for pdu in unknown.iter().chain(&lengths) {
         let frame = rtu(&[&[ADDRESS], &pdu[..]].concat());
-        bench.silence_to(&frame, "the request is to all units, and unknown")?;
+        tester.silence_to(&frame, "the request is to all units, and unknown")?;
     }
-    bench.alive("unknown requests to all units")
+    tester.alive("unknown requests to all units")
 }
 
-fn unknown_to_unit(bench: &mut Bench<'_>) -> Check {
-    claimed(bench)?;
+fn unknown_to_unit(tester: &mut Tester<'_>) -> Check {
+    claimed(tester)?;
     for sub in [0, 5, 7, 0x0F, 0x13, 0x19, 0x20, 0x7F, 0x80, 0xFF] {
-        bench.exception(&[FUNCTION, sub, 0], 1)?;
+        tester.exception(&[FUNCTION, sub, 0], 1)?;
     }
     Ok(())
 }
 
-fn wrong_settings(bench: &mut Bench<'_>) -> Check {
-    claimed(bench)?;
+fn wrong_settings(tester: &mut Tester<'_>) -> Check {
+    claimed(tester)?;
     // The event that the unit has started: to switch it off changes no point.
     let right = settings(&[start()]);
-    bench.reply(&right)?;
+    tester.reply(&right)?;
     for length in 3..right.len() {
         let mut short = right[..length].to_vec();
-        bench.exception_03_or_silence(&short)?;
+        tester.exception_03_or_silence(&short)?;
         short[2] = (length - 3) as u8;
         // A list without a point is right.
         if length > 3 {
-            bench.exception_03_or_silence(&short)?;
+            tester.exception_03_or_silence(&short)?;
         }
     }
-    bench.exception_03_or_silence(&[&right[..], &[0]].concat())
+    tester.exception_03_or_silence(&[&right[..], &[0]].concat())
 }
 
 /// Switches off the event that the unit has started.
@@ -179,10 +179,10 @@ const fn start() -> Setting {
 }
 
 /// Switches on the events of a point that has events. Skips the case if there is none.
-fn switch_on(bench: &mut Bench<'_>) -> Check<Setting> {
+fn switch_on(tester: &mut Tester<'_>) -> Check<Setting> {
     for kind in kind::COIL..=kind::INPUT_REGISTER {
         // The types of events are the functions that read the points.
-        let Some(span) = bench.target.readable(kind).first() else {
+        let Some(span) = tester.target.readable(kind).first() else {
             continue;
         };
         let point = Setting {
@@ -191,60 +191,60 @@ fn switch_on(bench: &mut Bench<'_>) -> Check<Setting> {
             priority: Priority::Low,
         };
         let both = [point, start()];
-        let reply = bench.reply(&settings(&both))?;
+        let reply = tester.reply(&settings(&both))?;
         match are_on(&both, &reply).as_deref() {
             Some([true, false]) => return Ok(point),
             Some([false, false]) => {}
-            _ => return bench.fail("a bit for each setting, and start off"),
+            _ => return tester.fail("a bit for each setting, and start off"),
         }
     }
     skip("no point reports events")
 }
 
 /// Fetches packets until there is one of the unit; `None` if no unit has events.
-fn fetch(bench: &mut Bench<'_>, mut confirmed: Option<(u8, u8)>) -> Check<Option<Packet>> {
+fn fetch(tester: &mut Tester<'_>, mut confirmed: Option<(u8, u8)>) -> Check<Option<Packet>> {
     for _ in 0..MOST_PACKETS {
         let request = Request::Fetch {
             least: 0,
             room: 100,
             confirmed,
         };
-        match ask(bench, &request)? {
-            Some(Reply::Events(packet)) if packet.unit == bench.unit() => return Ok(Some(packet)),
+        match ask(tester, &request)? {
+            Some(Reply::Events(packet)) if packet.unit == tester.unit() => return Ok(Some(packet)),
             Some(Reply::Events(packet)) => confirmed = Some((packet.unit, packet.flag)),
             Some(Reply::NoEvents) => return Ok(None),
-            _ => return bench.fail("events, or that there are none"),
+            _ => return tester.fail("events, or that there are none"),
         }
     }
-    bench.fail("the unit's events, or that there are none")
+    tester.fail("the unit's events, or that there are none")
 }
 
-fn events(bench: &mut Bench<'_>) -> Check {
-    claimed(bench)?;
-    let point = switch_on(bench)?;
-    let result = reported(bench, point);
+fn events(tester: &mut Tester<'_>) -> Check {
+    claimed(tester)?;
+    let point = switch_on(tester)?;
+    let result = reported(tester, point);
     let off = Setting {
         priority: Priority::Off,
         ..point
     };
-    bench.reply(&settings(&[off]))?;
+    tester.reply(&settings(&[off]))?;
     result
 }
 
-fn reported(bench: &mut Bench<'_>, point: Setting) -> Check {
+fn reported(tester: &mut Tester<'_>, point: Setting) -> Check {
     let is_of_point = |packet: &Packet| {
         let mut events = packet.events.iter();
         events.any(|event| (event.kind, event.id) == (point.kind, point.id))
     };
-    let Some(mut packet) = fetch(bench, None)? else {
-        return bench.fail("the state of the point");
+    let Some(mut packet) = fetch(tester, None)? else {
+        return tester.fail("the state of the point");
     };
-    let again = fetch(bench, None)?.as_ref() == Some(&packet);
-    bench.ensure(again, "the same packet, because it is not confirmed")?;
+    let again = fetch(tester, None)?.as_ref() == Some(&packet);
+    tester.ensure(again, "the same packet, because it is not confirmed")?;
     // A packet that was not confirmed before this case is sent first.
     for _ in 0..MOST_PACKETS {
-        let next = fetch(bench, Some((bench.unit(), packet.flag)))?;
-        bench.ensure(
+        let next = fetch(tester, Some((tester.unit(), packet.flag)))?;
+        tester.ensure(
             next.as_ref().is_none_or(|next| next.flag != packet.flag),
             "a packet with another flag, or none, after the confirmation",
         )?;
@@ -256,5 +256,5 @@ fn reported(bench: &mut Bench<'_>, point: Setting) -> Check {
             None => break,
         }
     }
-    bench.fail("the state of the point")
+    tester.fail("the state of the point")
 }

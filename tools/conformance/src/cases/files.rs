@@ -5,9 +5,9 @@ use register_map::edges::log;
 use register_map::update::{BLOCK_BYTES, status};
 use register_map::{points, state};
 
-use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case, skip};
 use crate::target::Span;
+use crate::tester::Tester;
 
 const N: &[Need] = &[Need::Function(0x14)];
 const M: &[Need] = &[Need::Function(0x14), Need::Modio];
@@ -50,13 +50,13 @@ fn request(groups: &[Group]) -> Vec<u8> {
 }
 
 /// Reads groups. Returns the bytes of each group.
-fn read(bench: &mut Bench<'_>, groups: &[Group]) -> Check<Vec<Vec<u8>>> {
-    let reply = bench.reply(&request(groups))?;
+fn read(tester: &mut Tester<'_>, groups: &[Group]) -> Check<Vec<Vec<u8>>> {
+    let reply = tester.reply(&request(groups))?;
     let [0x14, count, ref rest @ ..] = reply[..] else {
-        return bench.fail("14, a byte count and groups");
+        return tester.fail("14, a byte count and groups");
     };
     let wanted = "a byte count equal to the number of bytes";
-    bench.ensure(rest.len() == usize::from(count), wanted)?;
+    tester.ensure(rest.len() == usize::from(count), wanted)?;
     let (mut rest, mut read) = (rest, Vec::new());
     for (_, _, records) in groups {
         let bytes = usize::from(*records) * 2;
@@ -66,154 +66,154 @@ fn read(bench: &mut Bench<'_>, groups: &[Group]) -> Check<Vec<Vec<u8>>> {
                 read.push(group[2..].to_vec());
                 rest = others;
             }
-            _ => return bench.fail(format!("a group of {bytes} bytes with its length and 06")),
+            _ => return tester.fail(format!("a group of {bytes} bytes with its length and 06")),
         }
     }
-    bench.ensure(rest.is_empty(), "nothing after the groups")?;
+    tester.ensure(rest.is_empty(), "nothing after the groups")?;
     Ok(read)
 }
 
-fn byte_count(bench: &mut Bench<'_>) -> Check {
-    bench.exception(&[0x14, 0], 3)?;
-    bench.exception(&[0x14, 6, 6, 0, 1, 0, 0, 0], 3)?;
+fn byte_count(tester: &mut Tester<'_>) -> Check {
+    tester.exception(&[0x14, 0], 3)?;
+    tester.exception(&[0x14, 6, 6, 0, 1, 0, 0, 0], 3)?;
     // A request has 35 groups at most. This one has one byte more.
     let most = group(6, (1, 0, 1)).repeat(35);
     let pdu = [&[0x14, 0xF6], &most[..], &[6]].concat();
-    bench.exception(&pdu, 3)
+    tester.exception(&pdu, 3)
 }
 
-fn length(bench: &mut Bench<'_>) -> Check {
+fn length(tester: &mut Tester<'_>) -> Check {
     let whole = request(&[(1, 0, 1)]);
     for length in [1, 2, 5, whole.len() - 1] {
-        bench.exception_03_or_silence(&whole[..length])?;
+        tester.exception_03_or_silence(&whole[..length])?;
     }
-    bench.exception_03_or_silence(&[&whole[..], &[0]].concat())?;
+    tester.exception_03_or_silence(&[&whole[..], &[0]].concat())?;
     // A second group that is cut short.
     let cut = [&[0x14, 10], &group(6, (1, 0, 1))[..], &[6, 0, 1]].concat();
-    bench.exception_03_or_silence(&cut)
+    tester.exception_03_or_silence(&cut)
 }
 
-fn reference_type(bench: &mut Bench<'_>) -> Check {
+fn reference_type(tester: &mut Tester<'_>) -> Check {
     for reference in [0, 5, 7, 0xFF] {
         let pdu = [&[0x14, 7], &group(reference, (1, 0, 1))[..]].concat();
-        bench.exception(&pdu, 2)?;
+        tester.exception(&pdu, 2)?;
     }
     Ok(())
 }
 
-fn file_0(bench: &mut Bench<'_>) -> Check {
-    bench.exception(&request(&[(0, 0, 1)]), 2)
+fn file_0(tester: &mut Tester<'_>) -> Check {
+    tester.exception(&request(&[(0, 0, 1)]), 2)
 }
 
-fn record_above_9999(bench: &mut Bench<'_>) -> Check {
+fn record_above_9999(tester: &mut Tester<'_>) -> Check {
     for record in [10_000, 0x8000, 0xFFFF] {
-        bench.exception(&request(&[(1, record, 1)]), 2)?;
+        tester.exception(&request(&[(1, record, 1)]), 2)?;
     }
     Ok(())
 }
 
-fn longest_reply(bench: &mut Bench<'_>) -> Check {
+fn longest_reply(tester: &mut Tester<'_>) -> Check {
     for groups in [
         &[(1, 0, 125)][..],
         &[(1, 0, 0x8000)],
         &[(1, 0, 62), (1, 0, 62)],
     ] {
-        let reply = bench.ask_due(&request(groups))?;
+        let reply = tester.ask_due(&request(groups))?;
         let wanted = "exception 03 or 02";
-        bench.ensure(matches!(reply.exception(0x14), Some(2 | 3)), wanted)?;
+        tester.ensure(matches!(reply.exception(0x14), Some(2 | 3)), wanted)?;
     }
     Ok(())
 }
 
 /// Reads the first two records of file 1. Returns them and the number of records of the file.
-fn head(bench: &mut Bench<'_>) -> Check<(Vec<u8>, u16)> {
-    let head = read(bench, &[(FILE, 0, 2)])?.concat();
+fn head(tester: &mut Tester<'_>) -> Check<(Vec<u8>, u16)> {
+    let head = read(tester, &[(FILE, 0, 2)])?.concat();
     let records = records(u16::from_be_bytes([head[0], head[1]]));
-    bench.ensure(records <= 10_000, "a length of at most 10000 records")?;
+    tester.ensure(records <= 10_000, "a length of at most 10000 records")?;
     Ok((head, records))
 }
 
-fn self_description(bench: &mut Bench<'_>) -> Check {
-    let (head, records) = head(bench)?;
+fn self_description(tester: &mut Tester<'_>) -> Check {
+    let (head, records) = head(tester)?;
     let mut file = Vec::new();
     for record in (0..records).step_by(124) {
         let count = (records - record).min(124);
-        file.extend(read(bench, &[(FILE, record, count)])?.concat());
+        file.extend(read(tester, &[(FILE, record, count)])?.concat());
     }
     let unit = match Description::open(&file) {
         Ok(unit) => unit,
-        Err(error) => return bench.fail(error),
+        Err(error) => return tester.fail(error),
     };
-    let crc = bench.read_word(state::DESCRIPTION_CRC)?;
+    let crc = tester.read_word(state::DESCRIPTION_CRC)?;
     let wanted = "the CRC in the second record";
-    bench.ensure(crc.to_be_bytes() == head[2..], wanted)?;
-    let in_force = bench.read_words(Span::of(state::MODULE_IN_FORCE, points::PORTS))?;
+    tester.ensure(crc.to_be_bytes() == head[2..], wanted)?;
+    let in_force = tester.read_words(Span::of(state::MODULE_IN_FORCE, points::PORTS))?;
     let described = (1..).zip(in_force).all(|(number, code)| {
         let port = unit.ports.iter().find(|port| port.number == number);
         port.map_or(0, |port| port.module) == code
     });
-    bench.ensure(described, format!("the modules of {:?}", unit.ports))
+    tester.ensure(described, format!("the modules of {:?}", unit.ports))
 }
 
-fn groups(bench: &mut Bench<'_>) -> Check {
+fn groups(tester: &mut Tester<'_>) -> Check {
     let wanted = [(FILE, 7, 3), (FILE, 0, 2), (FILE, 7, 3), (FILE, 20, 40)];
-    let together = read(bench, &wanted)?;
+    let together = read(tester, &wanted)?;
     for (group, bytes) in wanted.iter().zip(&together) {
-        let alone = read(bench, &[*group])?.concat();
+        let alone = read(tester, &[*group])?.concat();
         let must = format!("the same as with other groups: {bytes:02X?}");
-        bench.ensure(alone == *bytes, must)?;
+        tester.ensure(alone == *bytes, must)?;
     }
     Ok(())
 }
 
-fn longest_of_modio(bench: &mut Bench<'_>) -> Check {
-    read(bench, &[(FILE, 0, 124)])?;
-    bench.exception(&request(&[(FILE, 0, 125)]), 3)
+fn longest_of_modio(tester: &mut Tester<'_>) -> Check {
+    read(tester, &[(FILE, 0, 124)])?;
+    tester.exception(&request(&[(FILE, 0, 125)]), 3)
 }
 
 /// Returns the number of records of file 2, the state of an update; 0 without a loader, because then the unit has no such
 /// file.
-fn records_of_status(bench: &mut Bench<'_>) -> Check<u16> {
-    if bench.read_word(state::BUILD)? & state::build::NO_LOADER != 0 {
+fn records_of_status(tester: &mut Tester<'_>) -> Check<u16> {
+    if tester.read_word(state::BUILD)? & state::build::NO_LOADER != 0 {
         return Ok(0);
     }
-    let Some(board) = bench.target.modio.and_then(|modio| modio.board) else {
+    let Some(board) = tester.target.modio.and_then(|modio| modio.board) else {
         return skip("the register map does not know the board, and so not the size of its slots");
     };
     let blocks = board.layout().slot as usize / BLOCK_BYTES;
     Ok(status::BITMAP + blocks.div_ceil(16) as u16)
 }
 
-fn beyond_the_end(bench: &mut Bench<'_>) -> Check {
-    let (_, records) = head(bench)?;
-    let of_status = records_of_status(bench)?;
+fn beyond_the_end(tester: &mut Tester<'_>) -> Check {
+    let (_, records) = head(tester)?;
+    let of_status = records_of_status(tester)?;
     for (file, records) in [
         (FILE, records),
         (status::FILE, of_status),
         (log::FILE, log::END),
     ] {
         if let Some(last) = records.checked_sub(1) {
-            read(bench, &[(file, last, 1)])?;
-            bench.exception(&request(&[(file, last, 2)]), 2)?;
+            read(tester, &[(file, last, 1)])?;
+            tester.exception(&request(&[(file, last, 2)]), 2)?;
         }
         for beyond in [records, 9999] {
-            bench.exception(&request(&[(file, beyond, 1)]), 2)?;
+            tester.exception(&request(&[(file, beyond, 1)]), 2)?;
         }
     }
     for file in [4, 0x100, 0x180, 0xFFFF] {
-        bench.exception(&request(&[(file, 0, 1)]), 2)?;
-        bench.exception(&request(&[(FILE, 0, 1), (file, 0, 1)]), 2)?;
+        tester.exception(&request(&[(file, 0, 1)]), 2)?;
+        tester.exception(&request(&[(FILE, 0, 1), (file, 0, 1)]), 2)?;
     }
     Ok(())
 }
 
-fn read_only(bench: &mut Bench<'_>) -> Check {
-    let before = read(bench, &[(FILE, 0, 8)])?;
+fn read_only(tester: &mut Tester<'_>) -> Check {
+    let before = read(tester, &[(FILE, 0, 8)])?;
     for file in [FILE, 2, 0x100] {
         let pdu = [&[0x15, 9], &group(6, (file, 4, 1))[..], &[0x5A, 0xA5]].concat();
-        let reply = bench.ask_due(&pdu)?;
-        bench.ensure(reply.exception(0x15) == Some(2), "exception 02")?;
+        let reply = tester.ask_due(&pdu)?;
+        tester.ensure(reply.exception(0x15) == Some(2), "exception 02")?;
     }
-    let after = read(bench, &[(FILE, 0, 8)])?;
-    bench.ensure(after == before, "the same words as before")
+    let after = read(tester, &[(FILE, 0, 8)])?;
+    tester.ensure(after == before, "the same words as before")
 }

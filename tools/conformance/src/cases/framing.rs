@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use crate::bench::{Bench, apart};
 use crate::case::{Case, Check, Need, case};
 use crate::cases::dispatch::with_data;
 use crate::frame::{Reply, rtu};
+use crate::tester::{Tester, apart};
 
 const N: &[Need] = &[Need::Rtu];
 
@@ -34,54 +34,54 @@ pub(super) const CASES: &[Case] = &[
 ];
 
 /// Returns the bits to invert, one at a time: all bits where time is exact, elsewhere every ninth.
-fn bits(bench: &Bench<'_>, frame: &[u8]) -> Vec<usize> {
-    let step = bench.exact(1, 9);
+fn bits(tester: &Tester<'_>, frame: &[u8]) -> Vec<usize> {
+    let step = tester.exact(1, 9);
     (0..frame.len() * 8).step_by(step).collect()
 }
 
-fn bad_crc(bench: &mut Bench<'_>) -> Check {
-    let good = bench.ping();
-    for bit in bits(bench, &good) {
+fn bad_crc(tester: &mut Tester<'_>) -> Check {
+    let good = tester.ping();
+    for bit in bits(tester, &good) {
         let mut bad = good.clone();
         bad[bit / 8] ^= 1 << (bit % 8);
-        bench.silence_to(&bad, format!("bit {bit} is wrong"))?;
+        tester.silence_to(&bad, format!("bit {bit} is wrong"))?;
     }
-    bench.alive("frames with a wrong CRC")
+    tester.alive("frames with a wrong CRC")
 }
 
-fn swapped_crc(bench: &mut Bench<'_>) -> Check {
-    let mut bad = bench.ping();
+fn swapped_crc(tester: &mut Tester<'_>) -> Check {
+    let mut bad = tester.ping();
     let length = bad.len();
     bad.swap(length - 1, length - 2);
-    bench.silence_to(&bad, "the CRC's bytes are exchanged")?;
-    bench.alive("a frame with a wrong CRC")
+    tester.silence_to(&bad, "the CRC's bytes are exchanged")?;
+    tester.alive("a frame with a wrong CRC")
 }
 
-fn unknown_bad_crc(bench: &mut Bench<'_>) -> Check {
+fn unknown_bad_crc(tester: &mut Tester<'_>) -> Check {
     for function in [0x66, 0x41, 0x00, 0x80] {
-        let mut bad = bench.frame(&[function, 0, 0, 0, 1]);
+        let mut bad = tester.frame(&[function, 0, 0, 0, 1]);
         bad[6] ^= 0x10;
-        bench.silence_to(&bad, "the CRC is wrong")?;
+        tester.silence_to(&bad, "the CRC is wrong")?;
     }
-    bench.alive("a frame with a wrong CRC")
+    tester.alive("a frame with a wrong CRC")
 }
 
-fn bad_crc_write(bench: &mut Bench<'_>) -> Check {
-    let span = bench.bits()?.up_to(1);
-    bench.set_bits(span.first, &[false])?;
+fn bad_crc_write(tester: &mut Tester<'_>) -> Check {
+    let span = tester.bits()?.up_to(1);
+    tester.set_bits(span.first, &[false])?;
     let [high, low] = span.first.to_be_bytes();
-    for unit in [bench.unit(), 0] {
+    for unit in [tester.unit(), 0] {
         for bit in 0..16 {
             let mut bad = rtu(&[unit, 5, high, low, 0xFF, 0]);
             bad[6 + bit / 8] ^= 1 << (bit % 8);
-            bench.silence_to(&bad, "the CRC is wrong")?;
+            tester.silence_to(&bad, "the CRC is wrong")?;
         }
     }
-    bench.is_off(span)
+    tester.is_off(span)
 }
 
-fn short_noise(bench: &mut Bench<'_>) -> Check {
-    let unit = bench.unit();
+fn short_noise(tester: &mut Tester<'_>) -> Check {
+    let unit = tester.unit();
     for noise in [
         &[0x00][..],
         &[0xFF],
@@ -94,67 +94,70 @@ fn short_noise(bench: &mut Bench<'_>) -> Check {
         &rtu(&[unit]),
         &rtu(&[]),
     ] {
-        bench.silence_to(noise, "too short for a frame")?;
-        bench.alive("short noise")?;
+        tester.silence_to(noise, "too short for a frame")?;
+        tester.alive("short noise")?;
     }
     Ok(())
 }
 
-fn longest(bench: &mut Bench<'_>) -> Check {
+fn longest(tester: &mut Tester<'_>) -> Check {
     for length in [255, 256] {
-        let (function, frame) = with_data(bench, length - 4);
-        let right = bench.raw_due(&frame)?.exception(function) == Some(1);
+        let (function, frame) = with_data(tester, length - 4);
+        let right = tester.raw_due(&frame)?.exception(function) == Some(1);
         let wanted = format!("exception 01: a frame of {length} bytes is valid");
-        bench.ensure(right, wanted)?;
+        tester.ensure(right, wanted)?;
     }
     Ok(())
 }
 
-fn too_long(bench: &mut Bench<'_>) -> Check {
+fn too_long(tester: &mut Tester<'_>) -> Check {
     for length in [257, 258, 259, 300, 512, 513, 1000] {
-        let (_, frame) = with_data(bench, length - 4);
-        bench.silence_to(&frame, format!("{length} bytes are too long for a frame"))?;
-        bench.alive(format!("{length} bytes"))?;
+        let (_, frame) = with_data(tester, length - 4);
+        tester.silence_to(&frame, format!("{length} bytes are too long for a frame"))?;
+        tester.alive(format!("{length} bytes"))?;
     }
     Ok(())
 }
 
-fn joined(bench: &mut Bench<'_>) -> Check {
-    let ping = bench.ping();
+fn joined(tester: &mut Tester<'_>) -> Check {
+    let ping = tester.ping();
     for length in [1, 2, 7, 248, 249, 256, 257, 300, 512] {
         let bytes = [vec![0x33; length], ping.clone()].concat();
         let why = format!("the request follows {length} bytes without a silence");
-        bench.silence_to(&bytes, why)?;
-        bench.alive(format!("{length} bytes and a request"))?;
+        tester.silence_to(&bytes, why)?;
+        tester.alive(format!("{length} bytes and a request"))?;
     }
     Ok(())
 }
 
-fn truncated(bench: &mut Bench<'_>) -> Check {
-    let ping = bench.ping();
+fn truncated(tester: &mut Tester<'_>) -> Check {
+    let ping = tester.ping();
     for length in 1..ping.len() {
-        bench.silence_to(&ping[..length], "the request is cut")?;
-        bench.alive("a truncated request")?;
+        tester.silence_to(&ping[..length], "the request is cut")?;
+        tester.alive("a truncated request")?;
     }
     // The second half of a request must not complete the first half.
     let half = ping.len() / 2;
-    let gap = bench.endpoint.line().t35_limits().most * 2 + Duration::from_millis(20);
+    let gap = tester.endpoint.line().t35_limits().most * 2 + Duration::from_millis(20);
     let pieces = apart(&ping[..half], gap, &ping[half..]);
     let why = "a silence in the middle makes two frames of the request";
-    bench.silence(&pieces, why)?;
-    bench.alive("two halves")
+    tester.silence(&pieces, why)?;
+    tester.alive("two halves")
 }
 
-fn two_at_once(bench: &mut Bench<'_>) -> Check {
-    let ping = bench.ping();
-    bench.silence_to(&ping.repeat(2), "they are one frame, with a wrong CRC")?;
-    let other = bench.target.mode.frame(bench.other(), &bench.target.ping);
-    bench.silence_to(&[other, ping].concat(), "they are one frame")?;
-    bench.alive("joined requests")
+fn two_at_once(tester: &mut Tester<'_>) -> Check {
+    let ping = tester.ping();
+    tester.silence_to(&ping.repeat(2), "they are one frame, with a wrong CRC")?;
+    let other = tester
+        .target
+        .mode
+        .frame(tester.other(), &tester.target.ping);
+    tester.silence_to(&[other, ping].concat(), "they are one frame")?;
+    tester.alive("joined requests")
 }
 
-fn nothing_else(bench: &mut Bench<'_>) -> Check {
-    let ping = bench.target.ping.clone();
+fn nothing_else(tester: &mut Tester<'_>) -> Check {
+    let ping = tester.target.ping.clone();
     // A read of one bit, of one register, or an echo.
     let length = match ping[0] {
         1 | 2 => 3,
@@ -163,27 +166,27 @@ fn nothing_else(bench: &mut Bench<'_>) -> Check {
     };
     for _ in 0..10 {
         // A wrong CRC shows any other additional byte, but a 00 after the CRC keeps the CRC right.
-        let reply = bench.reply(&ping)?;
+        let reply = tester.reply(&ping)?;
         let wanted = format!("a PDU of {length} bytes and no byte after its CRC");
-        bench.ensure(reply.len() == length, wanted)?;
-        let late = bench.listen_until(usize::MAX)?;
-        bench.ensure(late == Reply::Silence, "silence after the reply")?;
+        tester.ensure(reply.len() == length, wanted)?;
+        let late = tester.listen_until(usize::MAX)?;
+        tester.ensure(late == Reply::Silence, "silence after the reply")?;
     }
     Ok(())
 }
 
-fn trailing(bench: &mut Bench<'_>) -> Check {
+fn trailing(tester: &mut Tester<'_>) -> Check {
     for byte in [0xFF, 0x55, 0x01] {
-        let frame = [bench.ping(), vec![byte]].concat();
-        bench.silence_to(&frame, "a byte too many")?;
-        bench.alive("a byte too many")?;
+        let frame = [tester.ping(), vec![byte]].concat();
+        tester.silence_to(&frame, "a byte too many")?;
+        tester.alive("a byte too many")?;
     }
     // The CRC over a frame and its CRC is 0, and remains 0 with a 00 after it. So the frame is good, but its PDU is one
     // byte too long.
-    let frame = [bench.ping(), vec![0]].concat();
-    let function = bench.target.ping[0];
-    let reply = bench.raw(&frame)?;
+    let frame = [tester.ping(), vec![0]].concat();
+    let function = tester.target.ping[0];
+    let reply = tester.raw(&frame)?;
     let right = reply == Reply::Silence || reply.exception(function) == Some(3);
-    bench.ensure(right, "silence, or exception 03 for a PDU a byte too long")?;
-    bench.alive("a 00 too many")
+    tester.ensure(right, "silence, or exception 03 for a PDU a byte too long")?;
+    tester.alive("a 00 too many")
 }

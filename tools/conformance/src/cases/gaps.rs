@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use crate::bench::{Bench, apart};
 use crate::case::{Case, Check, Need, case};
 use crate::endpoint::Piece;
 use crate::frame::Reply;
+use crate::tester::{Tester, apart};
 
 const N: &[Need] = &[Need::Rtu, Need::Exact];
 const B: &[Need] = &[Need::Rtu, Need::Exact, Need::StartBit];
@@ -30,134 +30,140 @@ pub(super) const CASES: &[Case] = &[
 ];
 
 /// Distance of a gap from its limit: 3 bits, but at least 20 us.
-fn margin(bench: &Bench<'_>) -> Duration {
-    let line = bench.endpoint.line();
+fn margin(tester: &Tester<'_>) -> Duration {
+    let line = tester.endpoint.line();
     // A receiver may count the stop bits as silence, and needs one bit to detect a start bit.
     line.bits(3).max(Duration::from_micros(20))
 }
 
 /// Returns the request with a gap before the byte at `index`.
-fn with_gap(bench: &mut Bench<'_>, index: usize, gap: Duration) -> Check<Reply> {
-    let frame = bench.ping();
+fn with_gap(tester: &mut Tester<'_>, index: usize, gap: Duration) -> Check<Reply> {
+    let frame = tester.ping();
     let (first, rest) = frame.split_at(index);
-    bench.exchange(&apart(first, gap, rest))
+    tester.exchange(&apart(first, gap, rest))
 }
 
-fn places(bench: &Bench<'_>) -> [usize; 4] {
-    let length = bench.ping().len();
+fn places(tester: &Tester<'_>) -> [usize; 4] {
+    let length = tester.ping().len();
     [1, 2, length / 2, length - 1]
 }
 
-fn below_t15(bench: &mut Bench<'_>) -> Check {
-    let t15 = bench.endpoint.line().t15_limits().least;
-    for index in places(bench) {
-        for gap in [t15 / 4, t15 / 2, t15 - margin(bench)] {
-            let reply = with_gap(bench, index, gap)?;
+fn below_t15(tester: &mut Tester<'_>) -> Check {
+    let t15 = tester.endpoint.line().t15_limits().least;
+    for index in places(tester) {
+        for gap in [t15 / 4, t15 / 2, t15 - margin(tester)] {
+            let reply = with_gap(tester, index, gap)?;
             let wanted = format!("a reply: a gap of {gap:?} is below t1.5, {t15:?}");
-            bench.ensure(bench.is_pong(&reply), wanted)?;
+            tester.ensure(tester.is_pong(&reply), wanted)?;
         }
     }
     // A gap after every byte.
     let mut pieces = Vec::new();
-    for byte in bench.ping() {
+    for byte in tester.ping() {
         pieces.extend([Piece::Bytes(vec![byte]), Piece::Gap(t15 / 2)]);
     }
     pieces.pop();
-    bench.answers(&pieces, "a reply: all gaps are below t1.5")
+    tester.answers(&pieces, "a reply: all gaps are below t1.5")
 }
 
 /// Returns a gap between t1.5 and t3.5 that ends more than a character below t3.5, at any rate and format.
-fn middle(bench: &Bench<'_>) -> Duration {
-    let line = bench.endpoint.line();
+fn middle(tester: &Tester<'_>) -> Duration {
+    let line = tester.endpoint.line();
     let (above, below) = (line.t15_limits().most, line.t35_limits().least);
     above + (below - above) / 3
 }
 
-fn between(bench: &mut Bench<'_>) -> Check {
-    let low = bench.endpoint.line().t15_limits().most + margin(bench);
-    kept_or_dropped(bench, &[low, middle(bench)])
+fn between(tester: &mut Tester<'_>) -> Check {
+    let low = tester.endpoint.line().t15_limits().most + margin(tester);
+    kept_or_dropped(tester, &[low, middle(tester)])
 }
 
-fn just_below_t35(bench: &mut Bench<'_>) -> Check {
-    let high = bench.endpoint.line().t35_limits().least - margin(bench);
-    kept_or_dropped(bench, &[middle(bench), high])
+fn just_below_t35(tester: &mut Tester<'_>) -> Check {
+    let high = tester.endpoint.line().t35_limits().least - margin(tester);
+    kept_or_dropped(tester, &[middle(tester), high])
 }
 
 /// Sends frames with these gaps between t1.5 and t3.5. The unit must keep all of them or drop all of them.
-fn kept_or_dropped(bench: &mut Bench<'_>, gaps: &[Duration]) -> Check {
-    let mut dropped = bench.target.strict_t15;
-    for index in places(bench) {
+fn kept_or_dropped(tester: &mut Tester<'_>, gaps: &[Duration]) -> Check {
+    let mut dropped = tester.target.strict_t15;
+    for index in places(tester) {
         for &gap in gaps {
-            let reply = with_gap(bench, index, gap)?;
-            let answered = bench.is_pong(&reply);
+            let reply = with_gap(tester, index, gap)?;
+            let answered = tester.is_pong(&reply);
             let right = answered || reply == Reply::Silence;
-            bench.ensure(right, "a reply or silence")?;
+            tester.ensure(right, "a reply or silence")?;
             let strict = *dropped.get_or_insert(!answered);
             let wanted = if strict {
                 "silence: frames with a gap above t1.5 are dropped"
             } else {
                 "a reply: frames with a gap above t1.5 are kept"
             };
-            bench.ensure(strict != answered, format!("{wanted}; the gap is {gap:?}"))?;
+            tester.ensure(strict != answered, format!("{wanted}; the gap is {gap:?}"))?;
         }
     }
-    bench.alive("frames with gaps")
+    tester.alive("frames with gaps")
 }
 
-fn above_t35(bench: &mut Bench<'_>) -> Check {
-    let t35 = bench.endpoint.line().t35_limits().most;
-    for index in places(bench) {
-        for gap in [t35 + margin(bench), t35 * 2, t35 * 10] {
-            let reply = with_gap(bench, index, gap)?;
+fn above_t35(tester: &mut Tester<'_>) -> Check {
+    let t35 = tester.endpoint.line().t35_limits().most;
+    for index in places(tester) {
+        for gap in [t35 + margin(tester), t35 * 2, t35 * 10] {
+            let reply = with_gap(tester, index, gap)?;
             let wanted = format!("silence: a gap of {gap:?} is above t3.5, {t35:?}");
-            bench.ensure(reply == Reply::Silence, wanted)?;
+            tester.ensure(reply == Reply::Silence, wanted)?;
         }
     }
-    bench.alive("frames with gaps")
+    tester.alive("frames with gaps")
 }
 
-fn too_soon(bench: &mut Bench<'_>) -> Check {
-    let t35 = bench.endpoint.line().t35_limits().least;
-    joined_after(bench, &[t35 / 4, t35 / 2])
+fn too_soon(tester: &mut Tester<'_>) -> Check {
+    let t35 = tester.endpoint.line().t35_limits().least;
+    joined_after(tester, &[t35 / 4, t35 / 2])
 }
 
-fn a_bit_too_soon(bench: &mut Bench<'_>) -> Check {
-    let gap = bench.endpoint.line().t35_limits().least - margin(bench);
-    joined_after(bench, &[gap])
+fn a_bit_too_soon(tester: &mut Tester<'_>) -> Check {
+    let gap = tester.endpoint.line().t35_limits().least - margin(tester);
+    joined_after(tester, &[gap])
 }
 
 /// Sends requests after these gaps. Each request must be joined with the one before it.
-fn joined_after(bench: &mut Bench<'_>, gaps: &[Duration]) -> Check {
-    let mine = bench.ping();
-    let others = bench.target.mode.frame(bench.other(), &bench.target.ping);
+fn joined_after(tester: &mut Tester<'_>, gaps: &[Duration]) -> Check {
+    let mine = tester.ping();
+    let others = tester
+        .target
+        .mode
+        .frame(tester.other(), &tester.target.ping);
     for first in [mine.clone(), others] {
         for &gap in gaps {
             let pieces = apart(&first, gap, &mine);
-            bench.silence(&pieces, format!("{gap:?} is less than t3.5"))?;
-            bench.alive("joined requests")?;
+            tester.silence(&pieces, format!("{gap:?} is less than t3.5"))?;
+            tester.alive("joined requests")?;
         }
     }
     Ok(())
 }
 
-fn soon_enough(bench: &mut Bench<'_>) -> Check {
-    let t35 = bench.endpoint.line().t35_limits().most;
-    let mine = bench.ping();
-    let others = bench.target.mode.frame(bench.other(), &bench.target.ping);
-    for gap in [t35 + margin(bench), t35 * 2] {
+fn soon_enough(tester: &mut Tester<'_>) -> Check {
+    let t35 = tester.endpoint.line().t35_limits().most;
+    let mine = tester.ping();
+    let others = tester
+        .target
+        .mode
+        .frame(tester.other(), &tester.target.ping);
+    for gap in [t35 + margin(tester), t35 * 2] {
         let wanted = format!("a reply: {gap:?} is above t3.5");
-        bench.answers(&apart(&others, gap, &mine), wanted)?;
+        tester.answers(&apart(&others, gap, &mine), wanted)?;
     }
     Ok(())
 }
 
-fn after_noise(bench: &mut Bench<'_>) -> Check {
-    let gap = bench.endpoint.line().t35_limits().most + margin(bench);
-    let mine = bench.ping();
+fn after_noise(tester: &mut Tester<'_>) -> Check {
+    let gap = tester.endpoint.line().t35_limits().most + margin(tester);
+    let mine = tester.ping();
     for length in [1, 2, 3, 8, 100, 255, 256, 257, 600] {
         let noise = vec![0xA7; length];
         let wanted = format!("a reply, {gap:?} after {length} bytes of noise");
-        bench.answers(&apart(&noise, gap, &mine), wanted)?;
+        tester.answers(&apart(&noise, gap, &mine), wanted)?;
     }
     Ok(())
 }

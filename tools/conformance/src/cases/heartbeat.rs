@@ -5,9 +5,9 @@ use std::time::Duration;
 use register_map::configuration::{HEARTBEAT, KEY, OPEN_S, SERIAL_LOW};
 use register_map::state;
 
-use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case, skip};
 use crate::points::{pdu, write_words};
+use crate::tester::Tester;
 
 #[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
@@ -17,37 +17,37 @@ pub(super) const CASES: &[Case] = &[
 ];
 
 /// Waits until the lock is closed. Skips the case where that would take a minute of the user's time.
-fn close(bench: &mut Bench<'_>) -> Check {
-    if bench.read_word(KEY)? == 0 {
+fn close(tester: &mut Tester<'_>) -> Check {
+    if tester.read_word(KEY)? == 0 {
         return Ok(());
     }
-    if !bench.endpoint.abilities().exact {
+    if !tester.endpoint.abilities().exact {
         return skip("the lock is open");
     }
-    bench.rest(Duration::from_secs(OPEN_S.into()))?;
-    let open = bench.read_word(KEY)?;
-    bench.ensure(open == 0, "the lock closed, a minute after the last write")
+    tester.rest(Duration::from_secs(OPEN_S.into()))?;
+    let open = tester.read_word(KEY)?;
+    tester.ensure(open == 0, "the lock closed, a minute after the last write")
 }
 
-fn heartbeat(bench: &mut Bench<'_>) -> Check {
-    close(bench)?;
-    let before = bench.read_word(state::STATUS)?;
+fn heartbeat(tester: &mut Tester<'_>) -> Check {
+    close(tester)?;
+    let before = tester.read_word(state::STATUS)?;
     let [high, low] = HEARTBEAT.to_be_bytes();
     for value in [0, 1, 0xFFFF] {
         let request = pdu(6, HEARTBEAT, value);
-        bench.reply_is(&request, &request)?;
+        tester.reply_is(&request, &request)?;
         let reply = pdu(0x10, HEARTBEAT, 1);
-        bench.reply_is(&write_words(HEARTBEAT, &[value]), &reply)?;
+        tester.reply_is(&write_words(HEARTBEAT, &[value]), &reply)?;
         let [a, b] = value.to_be_bytes();
         let masks = [0x16, high, low, 0, 0, a, b];
-        bench.reply_is(&masks, &masks)?;
+        tester.reply_is(&masks, &masks)?;
         let with_read = [0x17, high, low, 0, 1, high, low, 0, 1, 2, a, b];
-        bench.reply_is(&with_read, &[0x17, 2, 0, 0])?;
+        tester.reply_is(&with_read, &[0x17, 2, 0, 0])?;
     }
-    bench.silence_of(0, &pdu(6, HEARTBEAT, 1), "a broadcast")?;
-    bench.word_is(HEARTBEAT, 0)?;
-    bench.word_is(KEY, 0)?;
-    bench.word_is(state::STATUS, before)?;
-    let serial = bench.read_word(SERIAL_LOW)?;
-    bench.exception(&write_words(SERIAL_LOW, &[serial, 1]), 6)
+    tester.silence_of(0, &pdu(6, HEARTBEAT, 1), "a broadcast")?;
+    tester.word_is(HEARTBEAT, 0)?;
+    tester.word_is(KEY, 0)?;
+    tester.word_is(state::STATUS, before)?;
+    let serial = tester.read_word(SERIAL_LOW)?;
+    tester.exception(&write_words(SERIAL_LOW, &[serial, 1]), 6)
 }

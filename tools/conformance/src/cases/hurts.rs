@@ -5,11 +5,11 @@ use std::time::Duration;
 use fastrand::Rng;
 use register_map::{configuration, state};
 
-use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case};
 use crate::cases::timing::hundred_requests;
 use crate::frame::{Mode, Reply, crc, rtu};
 use crate::points::{pdu, words_of};
+use crate::tester::Tester;
 
 #[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
@@ -35,14 +35,14 @@ pub(super) const CASES: &[Case] = &[
 ];
 
 /// Returns the number of random frames, or bursts of noise: more where the host does not have to wait for them.
-fn many(bench: &Bench<'_>) -> usize {
-    bench.exact(500, 60)
+fn many(tester: &Tester<'_>) -> usize {
+    tester.exact(500, 60)
 }
 
 /// Returns a generator of random numbers, which are the same in every run on the same unit and line. Each `use_of`,
 /// each module and each rate has its own numbers, so that tests of several units try different frames.
-fn generator(bench: &Bench<'_>, use_of: Use) -> Rng {
-    let (target, line) = (bench.target, bench.endpoint.line());
+fn generator(tester: &Tester<'_>, use_of: Use) -> Rng {
+    let (target, line) = (tester.target, tester.endpoint.line());
     let modio = target.modio.map(|modio| modio.to_string());
     let unit = format!("{} {:?} {modio:?} {line}", target.unit, target.mode);
     let [high, low] = crc(unit.as_bytes());
@@ -80,34 +80,34 @@ fn harmless(rng: &mut Rng, unknown: &[u8]) -> Vec<u8> {
     pdu
 }
 
-fn odd_frames(bench: &mut Bench<'_>) -> Check {
-    let rng = generator(bench, Use::OddFrames);
-    send_odd_frames(bench, rng)
+fn odd_frames(tester: &mut Tester<'_>) -> Check {
+    let rng = generator(tester, Use::OddFrames);
+    send_odd_frames(tester, rng)
 }
 
-fn send_odd_frames(bench: &mut Bench<'_>, mut rng: Rng) -> Check {
-    let unknown = super::dispatch::unknown_functions(bench);
-    for n in 0..many(bench) {
+fn send_odd_frames(tester: &mut Tester<'_>, mut rng: Rng) -> Check {
+    let unknown = super::dispatch::unknown_functions(tester);
+    for n in 0..many(tester) {
         let pdu = harmless(&mut rng, &unknown);
-        let unit = if rng.u8(0..8) == 0 { 0 } else { bench.unit() };
-        let reply = bench.ask_unit(unit, &pdu)?;
+        let unit = if rng.u8(0..8) == 0 { 0 } else { tester.unit() };
+        let reply = tester.ask_unit(unit, &pdu)?;
         let right = match &reply {
             Reply::Silence => true,
             Reply::Wrong(..) => false,
             Reply::Pdu(answer) => unit != 0 && answer[0] & 0x7F == pdu[0] & 0x7F,
         };
         let wanted = format!("silence, or a reply in good form: frame {n}");
-        bench.ensure(right, wanted)?;
+        tester.ensure(right, wanted)?;
         if n % 20 == 19 {
-            bench.alive("odd frames")?;
+            tester.alive("odd frames")?;
         }
     }
-    bench.alive("odd frames")
+    tester.alive("odd frames")
 }
 
-fn noise(bench: &mut Bench<'_>) -> Check {
-    let mut rng = generator(bench, Use::Noise);
-    for n in 0..many(bench) {
+fn noise(tester: &mut Tester<'_>) -> Check {
+    let mut rng = generator(tester, Use::Noise);
+    for n in 0..many(tester) {
         let length = if rng.u8(0..20) == 0 {
             rng.usize(200..600)
         } else {
@@ -115,65 +115,65 @@ fn noise(bench: &mut Bench<'_>) -> Check {
         };
         let mut bytes: Vec<u8> = (0..length).map(|_| rng.u8(..)).collect();
         if rng.bool() {
-            bytes[0] = bench.unit();
+            bytes[0] = tester.unit();
         }
         let split = bytes.len().saturating_sub(2);
         if bytes.len() >= 4 && rtu(&bytes[..split]) == bytes {
             continue;
         }
-        bench.silence_to(&bytes, format!("the bytes are noise, burst {n}"))?;
+        tester.silence_to(&bytes, format!("the bytes are noise, burst {n}"))?;
         if n % 20 == 19 {
-            bench.alive("noise")?;
+            tester.alive("noise")?;
         }
     }
-    bench.alive("noise")
+    tester.alive("noise")
 }
 
 /// Reads the uptime in seconds and the reset cause.
-fn age(bench: &mut Bench<'_>) -> Check<(u32, u16)> {
-    let reply = bench.reply(&pdu(3, state::RESET_CAUSE, 3))?;
+fn age(tester: &mut Tester<'_>) -> Check<(u32, u16)> {
+    let reply = tester.reply(&pdu(3, state::RESET_CAUSE, 3))?;
     let [cause, high, low] = words_of(&reply)[..] else {
-        return bench.fail("three registers");
+        return tester.fail("three registers");
     };
     Ok((u32::from(high) << 16 | u32::from(low), cause))
 }
 
-fn restarts(bench: &mut Bench<'_>) -> Check {
-    let before = age(bench)?;
-    let begin = bench.endpoint.now();
-    bench.rest(Duration::from_secs(1))?;
-    let rng = generator(bench, Use::Restarts);
-    send_odd_frames(bench, rng)?;
-    let after = age(bench)?;
-    let passed = (bench.endpoint.now() - begin).as_secs_f64();
+fn restarts(tester: &mut Tester<'_>) -> Check {
+    let before = age(tester)?;
+    let begin = tester.endpoint.now();
+    tester.rest(Duration::from_secs(1))?;
+    let rng = generator(tester, Use::Restarts);
+    send_odd_frames(tester, rng)?;
+    let after = age(tester)?;
+    let passed = (tester.endpoint.now() - begin).as_secs_f64();
     let counted = f64::from(after.0.saturating_sub(before.0));
-    bench.ensure(after.1 == before.1, "the reset cause is unchanged")?;
+    tester.ensure(after.1 == before.1, "the reset cause is unchanged")?;
     // Where time is not exact, the unit may be a simulator that is slower than its clock.
-    let most = bench.exact(1.5, f64::INFINITY);
+    let most = tester.exact(1.5, f64::INFINITY);
     let right = after.0 >= before.0 && (counted - passed).abs() <= most;
     let wanted = format!("an uptime that has increased by {passed:.1} s");
-    bench.ensure(right, wanted)
+    tester.ensure(right, wanted)
 }
 
 /// Longest time in which a modio turns its driver off and its receiver on after a reply, unless a bit is longer.
 const READY: Duration = Duration::from_micros(10);
 
-fn no_gaps(bench: &mut Bench<'_>) -> Check {
-    let ready = bench.endpoint.line().bits(1).max(READY);
-    hundred_requests(bench, |bench| {
-        let last = bench.received.last();
+fn no_gaps(tester: &mut Tester<'_>) -> Check {
+    let ready = tester.endpoint.line().bits(1).max(READY);
+    hundred_requests(tester, |tester| {
+        let last = tester.received.last();
         let end = last.map_or(Duration::ZERO, |received| received.end);
-        (end + ready).saturating_sub(bench.endpoint.now())
+        (end + ready).saturating_sub(tester.endpoint.now())
     })
 }
 
-fn wrong_settings(bench: &mut Bench<'_>) -> Check {
+fn wrong_settings(tester: &mut Tester<'_>) -> Check {
     // Formats 4 to 6 have seven data bits, which RTU cannot use.
-    let formats: &[u16] = match bench.target.mode {
+    let formats: &[u16] = match tester.target.mode {
         Mode::Rtu => &[4, 5, 6, 7, 255, 0xFFFF],
         Mode::Ascii => &[7, 255, 0xFFFF],
     };
-    let modes: &[u16] = match bench.endpoint.line().format.data_bits {
+    let modes: &[u16] = match tester.endpoint.line().format.data_bits {
         7 => &[0, 2, 0xFFFF],
         _ => &[2, 0xFFFF],
     };
@@ -182,20 +182,20 @@ fn wrong_settings(bench: &mut Bench<'_>) -> Check {
         (configuration::FORMAT, formats),
         (configuration::MODE, modes),
     ] {
-        let before = bench.read_word(register)?;
+        let before = tester.read_word(register)?;
         for value in values {
-            bench.exception(&pdu(6, register, *value), 3)?;
+            tester.exception(&pdu(6, register, *value), 3)?;
         }
-        bench.word_is(register, before)?;
+        tester.word_is(register, before)?;
     }
     Ok(())
 }
 
-fn half_written(bench: &mut Bench<'_>) -> Check {
+fn half_written(tester: &mut Tester<'_>) -> Check {
     use register_map::{counters, points};
-    let slot = bench.target.modio.and_then(|modio| modio.slots().next());
+    let slot = tester.target.modio.and_then(|modio| modio.slots().next());
     let at = counters::of_point(slot.map_or(0, |(port, _)| points::first(port)));
-    let before = bench.reply(&pdu(3, at, 2))?;
+    let before = tester.reply(&pdu(3, at, 2))?;
     for (from, words) in [
         (at, &[0][..]),
         (at + 1, &[0]),
@@ -203,8 +203,8 @@ fn half_written(bench: &mut Bench<'_>) -> Check {
         (at, &[0, 1]),
         (at, &[0, 0, 0]),
     ] {
-        bench.exception(&crate::points::write_words(from, words), 3)?;
+        tester.exception(&crate::points::write_words(from, words), 3)?;
     }
-    let now = bench.reply(&pdu(3, at, 2))?;
-    bench.ensure(now == before, "the counter is unchanged")
+    let now = tester.reply(&pdu(3, at, 2))?;
+    tester.ensure(now == before, "the counter is unchanged")
 }

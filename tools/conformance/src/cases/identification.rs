@@ -1,7 +1,7 @@
 //! Device identification: function 2B, MEI type 0E.
 
-use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case, skip};
+use crate::tester::Tester;
 
 const N: &[Need] = &[Need::Function(0x2B)];
 const S: &str = "V1.1b3 6.21";
@@ -36,8 +36,8 @@ fn request(code: u8, object: u8) -> Vec<u8> {
 }
 
 /// Sends a request and splits the reply into its objects. The case fails when the reply does not have the form of 6.21.
-fn page(bench: &mut Bench<'_>, code: u8, object: u8) -> Check<Page> {
-    let reply = bench.reply(&request(code, object))?;
+fn page(tester: &mut Tester<'_>, code: u8, object: u8) -> Check<Page> {
+    let reply = tester.reply(&request(code, object))?;
     let [
         0x2B,
         0x0E,
@@ -49,22 +49,22 @@ fn page(bench: &mut Bench<'_>, code: u8, object: u8) -> Check<Page> {
         ref rest @ ..,
     ] = reply[..]
     else {
-        return bench.fail("2B 0E, read code, conformity level, more follows, next object, count");
+        return tester.fail("2B 0E, read code, conformity level, more follows, next object, count");
     };
-    bench.ensure(echoed == code, format!("the read code {code:02X} again"))?;
+    tester.ensure(echoed == code, format!("the read code {code:02X} again"))?;
     let levels = [1, 2, 3, 0x81, 0x82, 0x83];
     let wanted = "a conformity level 01-03 or 81-83";
-    bench.ensure(levels.contains(&conformity), wanted)?;
-    bench.ensure(reply.len() <= 253, "a PDU of at most 253 bytes")?;
+    tester.ensure(levels.contains(&conformity), wanted)?;
+    tester.ensure(reply.len() <= 253, "a PDU of at most 253 bytes")?;
     let (mut objects, mut rest) = (Vec::new(), rest);
     while let [id, length, tail @ ..] = rest {
         let Some((value, tail)) = tail.split_at_checked(usize::from(*length)) else {
-            return bench.fail("each object as long as its length says");
+            return tester.fail("each object as long as its length says");
         };
         objects.push((*id, value.to_vec()));
         rest = tail;
     }
-    bench.ensure(
+    tester.ensure(
         rest.is_empty() && objects.len() == usize::from(count),
         format!("{count} objects and nothing after them"),
     )?;
@@ -72,7 +72,7 @@ fn page(bench: &mut Bench<'_>, code: u8, object: u8) -> Check<Page> {
         (0, 0) => None,
         (0xFF, next) if code != 4 => Some(next),
         _ => {
-            return bench.fail("more follows 00 and next object 00, or FF and the next object");
+            return tester.fail("more follows 00 and next object 00, or FF and the next object");
         }
     };
     Ok(Page {
@@ -83,20 +83,20 @@ fn page(bench: &mut Bench<'_>, code: u8, object: u8) -> Check<Page> {
 }
 
 /// Reads the objects from `first` to the end of the stream, with as many requests as needed.
-fn stream(bench: &mut Bench<'_>, code: u8, first: u8) -> Check<Vec<(u8, Vec<u8>)>> {
+fn stream(tester: &mut Tester<'_>, code: u8, first: u8) -> Check<Vec<(u8, Vec<u8>)>> {
     let (mut all, mut from) = (Vec::new(), first);
     loop {
-        let page = page(bench, code, from)?;
+        let page = page(tester, code, from)?;
         let wanted = "at least one object in each reply of a stream";
-        bench.ensure(!page.objects.is_empty(), wanted)?;
+        tester.ensure(!page.objects.is_empty(), wanted)?;
         all.extend(page.objects);
         let in_order = all.is_sorted_by(|a: &(u8, Vec<u8>), b| a.0 < b.0);
-        bench.ensure(in_order, "objects in ascending order, none twice")?;
+        tester.ensure(in_order, "objects in ascending order, none twice")?;
         let Some(next) = page.next else {
             return Ok(all);
         };
         let ahead = all.last().is_some_and(|last| next > last.0);
-        bench.ensure(ahead, "a next object after those received")?;
+        tester.ensure(ahead, "a next object after those received")?;
         from = next;
     }
 }
@@ -105,86 +105,86 @@ fn ids(objects: &[(u8, Vec<u8>)]) -> Vec<u8> {
     objects.iter().map(|object| object.0).collect()
 }
 
-fn basic(bench: &mut Bench<'_>) -> Check {
-    let objects = stream(bench, 1, 0)?;
-    bench.ensure(ids(&objects) == [0, 1, 2], "the objects 00, 01 and 02")?;
+fn basic(tester: &mut Tester<'_>) -> Check {
+    let objects = stream(tester, 1, 0)?;
+    tester.ensure(ids(&objects) == [0, 1, 2], "the objects 00, 01 and 02")?;
     let wanted = "vendor, product code and revision as ASCII";
-    bench.ensure(objects.iter().all(|object| object.1.is_ascii()), wanted)
+    tester.ensure(objects.iter().all(|object| object.1.is_ascii()), wanted)
 }
 
-fn regular(bench: &mut Bench<'_>) -> Check {
-    let level = page(bench, 1, 0)?.conformity & 0x7F;
-    let objects = ids(&stream(bench, 2, 0)?);
+fn regular(tester: &mut Tester<'_>) -> Check {
+    let level = page(tester, 1, 0)?.conformity & 0x7F;
+    let objects = ids(&stream(tester, 2, 0)?);
     if level == 1 {
         // A device of the basic level answers with its basic objects.
-        return bench.ensure(objects == [0, 1, 2], "the objects 00, 01 and 02");
+        return tester.ensure(objects == [0, 1, 2], "the objects 00, 01 and 02");
     }
-    if bench.target.modio.is_some() {
-        return bench.ensure(objects == [0, 1, 2, 3, 4, 5, 6], "the objects 00 to 06");
+    if tester.target.modio.is_some() {
+        return tester.ensure(objects == [0, 1, 2, 3, 4, 5, 6], "the objects 00 to 06");
     }
     // Each of 03 to 06 is optional.
-    bench.ensure(
+    tester.ensure(
         objects.starts_with(&[0, 1, 2]) && objects.iter().all(|id| *id <= 6),
         "the objects 00, 01 and 02, and none after 06",
     )
 }
 
-fn extended(bench: &mut Bench<'_>) -> Check {
-    let level = page(bench, 1, 0)?.conformity & 0x7F;
-    let objects = ids(&stream(bench, 3, 0)?);
-    bench.ensure(objects.starts_with(&[0, 1, 2]), "the basic objects first")?;
+fn extended(tester: &mut Tester<'_>) -> Check {
+    let level = page(tester, 1, 0)?.conformity & 0x7F;
+    let objects = ids(&stream(tester, 3, 0)?);
+    tester.ensure(objects.starts_with(&[0, 1, 2]), "the basic objects first")?;
     let has = objects.iter().any(|id| *id >= 0x80);
     let wanted = "objects from 80 on, as a device of the extended level has them";
-    bench.ensure(has || level < 3, wanted)
+    tester.ensure(has || level < 3, wanted)
 }
 
-fn needs_individual_access(bench: &mut Bench<'_>) -> Check {
-    if page(bench, 1, 0)?.conformity & 0x80 == 0 {
+fn needs_individual_access(tester: &mut Tester<'_>) -> Check {
+    if page(tester, 1, 0)?.conformity & 0x80 == 0 {
         return skip("its conformity level has no individual access");
     }
     Ok(())
 }
 
-fn individual(bench: &mut Bench<'_>) -> Check {
-    needs_individual_access(bench)?;
-    for (id, value) in stream(bench, 3, 0)? {
-        let one = page(bench, 4, id)?;
+fn individual(tester: &mut Tester<'_>) -> Check {
+    needs_individual_access(tester)?;
+    for (id, value) in stream(tester, 3, 0)? {
+        let one = page(tester, 4, id)?;
         let wanted = format!("only object {id:02X}, with the same value as in the stream");
-        bench.ensure(one.objects == [(id, value)], wanted)?;
+        tester.ensure(one.objects == [(id, value)], wanted)?;
     }
     Ok(())
 }
 
-fn individual_unknown(bench: &mut Bench<'_>) -> Check {
-    needs_individual_access(bench)?;
-    let known = ids(&stream(bench, 3, 0)?);
+fn individual_unknown(tester: &mut Tester<'_>) -> Check {
+    needs_individual_access(tester)?;
+    let known = ids(&stream(tester, 3, 0)?);
     for id in [0x07, 0x40, 0x7F, 0xFE, 0xFF] {
         if !known.contains(&id) {
-            bench.exception(&request(4, id), 2)?;
+            tester.exception(&request(4, id), 2)?;
         }
     }
     Ok(())
 }
 
-fn restarts(bench: &mut Bench<'_>) -> Check {
+fn restarts(tester: &mut Tester<'_>) -> Check {
     for code in 1..=3 {
-        let known = stream(bench, code, 0)?;
+        let known = stream(tester, code, 0)?;
         for id in [0x50, 0xFF] {
             if !known.iter().any(|object| object.0 == id) {
-                let again = stream(bench, code, id)?;
-                bench.ensure(again == known, "the whole stream, from object 0 on")?;
+                let again = stream(tester, code, id)?;
+                tester.ensure(again == known, "the whole stream, from object 0 on")?;
             }
         }
     }
     Ok(())
 }
 
-fn from_the_middle(bench: &mut Bench<'_>) -> Check {
+fn from_the_middle(tester: &mut Tester<'_>) -> Check {
     for code in 1..=3 {
-        let known = stream(bench, code, 0)?;
+        let known = stream(tester, code, 0)?;
         for (place, (id, _)) in known.iter().enumerate().skip(1) {
-            let rest = stream(bench, code, *id)?;
-            bench.ensure(
+            let rest = stream(tester, code, *id)?;
+            tester.ensure(
                 rest == known[place..],
                 format!(
                     "the objects from {id:02X} on, with the same values as in the whole stream"
@@ -195,22 +195,22 @@ fn from_the_middle(bench: &mut Bench<'_>) -> Check {
     Ok(())
 }
 
-fn read_code(bench: &mut Bench<'_>) -> Check {
+fn read_code(tester: &mut Tester<'_>) -> Check {
     for code in [0, 5, 6, 0x7F, 0x80, 0xFF] {
-        bench.exception(&request(code, 0), 3)?;
+        tester.exception(&request(code, 0), 3)?;
     }
     Ok(())
 }
 
-fn mei_type(bench: &mut Bench<'_>) -> Check {
+fn mei_type(tester: &mut Tester<'_>) -> Check {
     for mei in [0x00, 0x0D, 0x0F, 0xFF] {
-        bench.exception(&[0x2B, mei, 1, 0], 1)?;
+        tester.exception(&[0x2B, mei, 1, 0], 1)?;
     }
     Ok(())
 }
 
-fn length(bench: &mut Bench<'_>) -> Check {
-    bench.exception_03_or_silence(&[0x2B, 0x0E])?;
-    bench.exception_03_or_silence(&[0x2B, 0x0E, 1])?;
-    bench.exception_03_or_silence(&[0x2B, 0x0E, 1, 0, 0])
+fn length(tester: &mut Tester<'_>) -> Check {
+    tester.exception_03_or_silence(&[0x2B, 0x0E])?;
+    tester.exception_03_or_silence(&[0x2B, 0x0E, 1])?;
+    tester.exception_03_or_silence(&[0x2B, 0x0E, 1, 0, 0])
 }

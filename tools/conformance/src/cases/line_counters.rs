@@ -2,11 +2,11 @@
 
 use register_map::state;
 
-use crate::bench::{Bench, damaged_at};
 use crate::case::{Case, Check, Need, Stop, case, skip};
 use crate::cases::dispatch::unknown_function;
 use crate::endpoint::Piece;
 use crate::points::{diagnose, pdu};
+use crate::tester::{Tester, damaged_at};
 
 const S: &str = "V1.02 appendix A";
 
@@ -26,17 +26,17 @@ pub(super) const CASES: &[Case] = &[
 ];
 
 /// Reads a counter by function 08, or by a modio's register. The counter includes this request.
-pub(super) fn count(bench: &mut Bench<'_>, sub: u16) -> Check<u16> {
-    if bench.target.has(8) {
-        let reply = bench.reply_unless_lacking(&diagnose(sub, &[0, 0]), "such a counter")?;
+pub(super) fn count(tester: &mut Tester<'_>, sub: u16) -> Check<u16> {
+    if tester.target.has(8) {
+        let reply = tester.reply_unless_lacking(&diagnose(sub, &[0, 0]), "such a counter")?;
         let [8, _, echoed, high, low] = reply[..] else {
-            return bench.fail("08, the sub-function, two bytes");
+            return tester.fail("08, the sub-function, two bytes");
         };
-        bench.ensure(u16::from(echoed) == sub, "the sub-function again")?;
+        tester.ensure(u16::from(echoed) == sub, "the sub-function again")?;
         return Ok(u16::from_be_bytes([high, low]));
     }
-    if bench.target.modio.is_some() {
-        return bench.read_word(state::BUS_MESSAGES + (sub - 0x0B));
+    if tester.target.modio.is_some() {
+        return tester.read_word(state::BUS_MESSAGES + (sub - 0x0B));
     }
     skip("the unit has no line counters")
 }
@@ -44,131 +44,137 @@ pub(super) fn count(bench: &mut Bench<'_>, sub: u16) -> Check<u16> {
 /// Checks by how much a counter moves while `done` runs. `wanted` includes the request that reads the counter, if the
 /// counter counts such a request.
 fn moves(
-    bench: &mut Bench<'_>,
+    tester: &mut Tester<'_>,
     sub: u16,
     wanted: u16,
     what: &str,
-    mut done: impl FnMut(&mut Bench<'_>) -> Check,
+    mut done: impl FnMut(&mut Tester<'_>) -> Check,
 ) -> Check {
-    let before = count(bench, sub)?;
-    done(bench)?;
-    let after = count(bench, sub)?;
+    let before = count(tester, sub)?;
+    done(tester)?;
+    let after = count(tester, sub)?;
     let moved = after.wrapping_sub(before);
     let must = format!("counter {sub:02X} has moved by {wanted} ({what}), not by {moved}");
-    bench.ensure(moved == wanted, must)
+    tester.ensure(moved == wanted, must)
 }
 
-fn ping_other(bench: &mut Bench<'_>) -> Check {
-    bench.silent_ping(bench.other(), "another unit's request")
+fn ping_other(tester: &mut Tester<'_>) -> Check {
+    tester.silent_ping(tester.other(), "another unit's request")
 }
 
 /// Sends a broadcast that the unit refuses in silence, and that writes nothing.
-fn refused_broadcast(bench: &mut Bench<'_>) -> Check {
-    let function = [6, 5, 0x10].into_iter().find(|f| bench.target.has(*f));
+fn refused_broadcast(tester: &mut Tester<'_>) -> Check {
+    let function = [6, 5, 0x10].into_iter().find(|f| tester.target.has(*f));
     let Some(function) = function else {
         return skip("the unit has no function to broadcast");
     };
-    let Some(nowhere) = bench.target.nowhere_to_write(function) else {
+    let Some(nowhere) = tester.target.nowhere_to_write(function) else {
         return skip("every address exists");
     };
     let mut request = pdu(function, nowhere, 0);
     if function == 0x10 {
         request = crate::points::write_words(nowhere, &[0]);
     }
-    bench.silence_of(0, &request, "a broadcast")
+    tester.silence_of(0, &request, "a broadcast")
 }
 
 /// Returns a request whose check is wrong.
-pub(super) fn bad(bench: &Bench<'_>) -> Vec<u8> {
-    let mut frame = bench.ping();
+pub(super) fn bad(tester: &Tester<'_>) -> Vec<u8> {
+    let mut frame = tester.ping();
     let digit = frame.len() - 3;
     // In ASCII this is the last digit of the LRC, in RTU the last data byte.
     frame[digit] = if frame[digit] == b'0' { b'1' } else { b'0' };
     frame
 }
 
-fn bus_messages(bench: &mut Bench<'_>) -> Check {
+fn bus_messages(tester: &mut Tester<'_>) -> Check {
     let what = "2 for this unit, 3 for another, 1 to read it";
-    moves(bench, 0x0B, 6, what, |bench| {
+    moves(tester, 0x0B, 6, what, |tester| {
         for _ in 0..3 {
-            ping_other(bench)?;
+            ping_other(tester)?;
         }
-        bench.alive("others' requests")?;
-        let frame = bad(bench);
-        bench.silence_to(&frame, "the check is wrong")?;
-        bench.alive("a frame with a wrong check")
+        tester.alive("others' requests")?;
+        let frame = bad(tester);
+        tester.silence_to(&frame, "the check is wrong")?;
+        tester.alive("a frame with a wrong check")
     })
 }
 
-fn bus_errors(bench: &mut Bench<'_>) -> Check {
-    moves(bench, 0x0C, 3, "3 frames with a bad check", |bench| {
-        let frame = bad(bench);
+fn bus_errors(tester: &mut Tester<'_>) -> Check {
+    moves(tester, 0x0C, 3, "3 frames with a bad check", |tester| {
+        let frame = bad(tester);
         for _ in 0..3 {
-            bench.silence_to(&frame, "the check is wrong")?;
+            tester.silence_to(&frame, "the check is wrong")?;
         }
-        ping_other(bench)?;
-        bench.alive("frames with a wrong check")
+        ping_other(tester)?;
+        tester.alive("frames with a wrong check")
     })
 }
 
-fn short_frames(bench: &mut Bench<'_>) -> Check {
-    moves(bench, 0x0C, 2, "frames of 1 and 2 bytes", |bench| {
-        bench.silence_to(&[0x55], "noise")?;
-        bench.silence_to(&[bench.unit(), 3], "noise")
+fn short_frames(tester: &mut Tester<'_>) -> Check {
+    moves(tester, 0x0C, 2, "frames of 1 and 2 bytes", |tester| {
+        tester.silence_to(&[0x55], "noise")?;
+        tester.silence_to(&[tester.unit(), 3], "noise")
     })
 }
 
-fn damaged_characters(bench: &mut Bench<'_>) -> Check {
+fn damaged_characters(tester: &mut Tester<'_>) -> Check {
     let what = "1 frame with a damaged character";
-    moves(bench, 0x0C, 1, what, |bench| {
-        let pieces = damaged_at(&bench.ping(), 2, Piece::BadStop);
-        bench.silence(&pieces, "a stop bit is low")
+    moves(tester, 0x0C, 1, what, |tester| {
+        let pieces = damaged_at(&tester.ping(), 2, Piece::BadStop);
+        tester.silence(&pieces, "a stop bit is low")
     })
 }
 
-fn exceptions(bench: &mut Bench<'_>) -> Check {
-    let function = unknown_function(bench)?;
-    moves(bench, 0x0D, 2, "2 exceptions", |bench| {
-        bench.exception(&[function], 1)?;
-        bench.exception(&[function, 1, 2], 1)?;
-        ping_other(bench)?;
-        bench.alive("exceptions")
+fn exceptions(tester: &mut Tester<'_>) -> Check {
+    let function = unknown_function(tester)?;
+    moves(tester, 0x0D, 2, "2 exceptions", |tester| {
+        tester.exception(&[function], 1)?;
+        tester.exception(&[function, 1, 2], 1)?;
+        ping_other(tester)?;
+        tester.alive("exceptions")
     })?;
     let what = "1 broadcast that is refused";
-    moves(bench, 0x0D, 1, what, refused_broadcast)
+    moves(tester, 0x0D, 1, what, refused_broadcast)
 }
 
-fn unit_messages(bench: &mut Bench<'_>) -> Check {
-    moves(bench, 0x0E, 3, "2 and 1 to read it", |bench| {
-        ping_other(bench)?;
-        bench.alive("another's request")?;
-        bench.alive("a request")?;
-        let frame = bad(bench);
-        bench.silence_to(&frame, "the check is wrong")
+fn unit_messages(tester: &mut Tester<'_>) -> Check {
+    moves(tester, 0x0E, 3, "2 and 1 to read it", |tester| {
+        ping_other(tester)?;
+        tester.alive("another's request")?;
+        tester.alive("a request")?;
+        let frame = bad(tester);
+        tester.silence_to(&frame, "the check is wrong")
     })?;
     let what = "1 broadcast and 1 to read it";
-    moves(bench, 0x0E, 2, what, refused_broadcast)
+    moves(tester, 0x0E, 2, what, refused_broadcast)
 }
 
-fn no_response(bench: &mut Bench<'_>) -> Check {
-    moves(bench, 0x0F, 0, "everything for it was answered", |bench| {
-        ping_other(bench)?;
-        bench.alive("another's request")
-    })?;
-    moves(bench, 0x0F, 2, "2 broadcasts", |bench| {
-        refused_broadcast(bench)?;
-        refused_broadcast(bench)
+fn no_response(tester: &mut Tester<'_>) -> Check {
+    moves(
+        tester,
+        0x0F,
+        0,
+        "everything for it was answered",
+        |tester| {
+            ping_other(tester)?;
+            tester.alive("another's request")
+        },
+    )?;
+    moves(tester, 0x0F, 2, "2 broadcasts", |tester| {
+        refused_broadcast(tester)?;
+        refused_broadcast(tester)
     })
 }
 
-fn others(bench: &mut Bench<'_>) -> Check {
+fn others(tester: &mut Tester<'_>) -> Check {
     let mut lacking = Ok(());
     let mut has_one = false;
     for sub in [0x10, 0x11, 0x12] {
-        let moved = moves(bench, sub, 0, "ordinary traffic", |bench| {
+        let moved = moves(tester, sub, 0, "ordinary traffic", |tester| {
             for _ in 0..3 {
-                ping_other(bench)?;
-                bench.alive("another's request")?;
+                ping_other(tester)?;
+                tester.alive("another's request")?;
             }
             Ok(())
         });
@@ -181,18 +187,18 @@ fn others(bench: &mut Bench<'_>) -> Check {
     if has_one { Ok(()) } else { lacking }
 }
 
-fn registers(bench: &mut Bench<'_>) -> Check {
+fn registers(tester: &mut Tester<'_>) -> Check {
     for sub in 0x0B..=0x12_u16 {
-        let by_function = count(bench, sub)?;
+        let by_function = count(tester, sub)?;
         let register = state::BUS_MESSAGES + (sub - 0x0B);
-        let by_register = bench.read_word(register)?;
+        let by_register = tester.read_word(register)?;
         // A request to read moves the counters 0B and 0E by one.
         let moved = u16::from(matches!(sub, 0x0B | 0x0E));
         let wanted = format!(
             "register {register:04X} is the counter 08/{sub:02X}: {by_function} and {moved}"
         );
-        bench.ensure(by_register == by_function.wrapping_add(moved), wanted)?;
+        tester.ensure(by_register == by_function.wrapping_add(moved), wanted)?;
     }
-    let reply = bench.reply(&pdu(3, state::BUS_MESSAGES, 8))?;
-    bench.ensure(reply.len() == 18, "eight registers")
+    let reply = tester.reply(&pdu(3, state::BUS_MESSAGES, 8))?;
+    tester.ensure(reply.len() == 18, "eight registers")
 }

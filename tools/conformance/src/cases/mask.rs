@@ -1,9 +1,9 @@
 //! Mask write, 16, and read/write multiple registers, 17.
 
-use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case, skip};
 use crate::points::{pdu, words_of};
 use crate::target::Span;
+use crate::tester::Tester;
 
 const W16: &[Need] = &[Need::Function(0x16), Need::Function(3), Need::Words];
 const W17: &[Need] = &[Need::Function(0x17), Need::Function(3), Need::Words];
@@ -43,50 +43,50 @@ fn mask(address: u16, and: u16, or: u16) -> Vec<u8> {
     [pdu(0x16, address, and), or.to_be_bytes().to_vec()].concat()
 }
 
-fn formula(bench: &mut Bench<'_>) -> Check {
-    let words = bench.words()?;
+fn formula(tester: &mut Tester<'_>) -> Check {
+    let words = tester.words()?;
     let at = words.span.first;
     for (from, to) in [(words.low, words.high), (words.high, words.low)] {
         // Three pairs of masks that change one accepted value to another.
         let masks = [(0, to), (from & to, to), (!(from ^ to), to)];
         for (and, or) in masks {
-            bench.set_words(at, &[from])?;
+            tester.set_words(at, &[from])?;
             let request = mask(at, and, or);
-            bench.reply_is(&request, &request)?;
+            tester.reply_is(&request, &request)?;
             let wanted = (from & and) | (or & !and);
             let text = format!("{from:04X} with AND {and:04X}, OR {or:04X} becomes {wanted:04X}");
-            bench.words_are(Span::one(at), &[wanted], text)?;
+            tester.words_are(Span::one(at), &[wanted], text)?;
         }
-        bench.set_words(at, &[from])?;
+        tester.set_words(at, &[from])?;
         let keep = mask(at, 0xFFFF, 0xFFFF);
-        bench.reply_is(&keep, &keep)?;
+        tester.reply_is(&keep, &keep)?;
         let text = format!("AND FFFF keeps {from:04X}, whatever OR is");
-        bench.words_are(Span::one(at), &[from], text)?;
+        tester.words_are(Span::one(at), &[from], text)?;
     }
     Ok(())
 }
 
-fn mask_refused(bench: &mut Bench<'_>) -> Check {
-    let words = bench.words()?;
-    let bad = bench.refused_value()?;
+fn mask_refused(tester: &mut Tester<'_>) -> Check {
+    let words = tester.words()?;
+    let bad = tester.refused_value()?;
     let at = words.span.first;
-    bench.set_words(at, &[words.low])?;
-    bench.exception(&mask(at, 0, bad), 3)?;
-    bench.word_is(at, words.low)
+    tester.set_words(at, &[words.low])?;
+    tester.exception(&mask(at, 0, bad), 3)?;
+    tester.word_is(at, words.low)
 }
 
-fn mask_address(bench: &mut Bench<'_>) -> Check {
-    let nowhere = bench.nowhere(3)?;
-    bench.exception(&mask(nowhere, 0xFFFF, 0), 2)
+fn mask_address(tester: &mut Tester<'_>) -> Check {
+    let nowhere = tester.nowhere(3)?;
+    tester.exception(&mask(nowhere, 0xFFFF, 0), 2)
 }
 
-fn mask_length(bench: &mut Bench<'_>) -> Check {
-    let words = bench.words()?;
+fn mask_length(tester: &mut Tester<'_>) -> Check {
+    let words = tester.words()?;
     let at = words.span.first;
-    bench.set_words(at, &[words.low])?;
+    tester.set_words(at, &[words.low])?;
     let request = mask(at, 0, words.high);
-    bench.wrong_lengths(&request, &[1])?;
-    bench.word_is(at, words.low)
+    tester.wrong_lengths(&request, &[1])?;
+    tester.word_is(at, words.low)
 }
 
 /// Returns a request of function 17 that reads a span and writes values.
@@ -99,15 +99,15 @@ fn both(read: Span, write: u16, values: &[u16]) -> Vec<u8> {
     request
 }
 
-fn write_first(bench: &mut Bench<'_>) -> Check {
-    let words = bench.words()?;
+fn write_first(tester: &mut Tester<'_>) -> Check {
+    let words = tester.words()?;
     let longest = words.span.len().min(121) as u16;
     for quantity in (1..=longest.min(4)).chain([longest]) {
         let span = words.span.up_to(quantity);
         for value in [words.high, words.low] {
             let values = vec![value; usize::from(quantity)];
-            let reply = bench.reply(&both(span, span.first, &values))?;
-            bench.ensure(
+            let reply = tester.reply(&both(span, span.first, &values))?;
+            tester.ensure(
                 usize::from(reply[1]) == values.len() * 2 && words_of(&reply) == values,
                 format!("the values that were written: {values:04X?}"),
             )?;
@@ -116,25 +116,25 @@ fn write_first(bench: &mut Bench<'_>) -> Check {
     Ok(())
 }
 
-fn two_places(bench: &mut Bench<'_>) -> Check {
-    let words = bench.words()?;
+fn two_places(tester: &mut Tester<'_>) -> Check {
+    let words = tester.words()?;
     if words.span.len() < 2 {
         return skip("one register alone");
     }
     let (first, second) = (words.span.first, words.span.first + 1);
-    bench.set_words(first, &[words.low, words.low])?;
-    let reply = bench.reply(&both(Span::one(first), second, &[words.high]))?;
+    tester.set_words(first, &[words.low, words.low])?;
+    let reply = tester.reply(&both(Span::one(first), second, &[words.high]))?;
     let same = words_of(&reply) == [words.low];
-    bench.ensure(same, "the value of the first register from before")?;
+    tester.ensure(same, "the value of the first register from before")?;
     let wanted = "only the second register is written";
-    bench.words_are(words.span.up_to(2), &[words.low, words.high], wanted)
+    tester.words_are(words.span.up_to(2), &[words.low, words.high], wanted)
 }
 
-fn quantities(bench: &mut Bench<'_>) -> Check {
-    let read = bench.target.longest(3).map_or(0, |span| span.first);
-    let words = bench.words()?;
+fn quantities(tester: &mut Tester<'_>) -> Check {
+    let read = tester.target.longest(3).map_or(0, |span| span.first);
+    let words = tester.words()?;
     let write = words.span.first;
-    bench.set_words(write, &[words.low])?;
+    tester.set_words(write, &[words.low])?;
     for (reads, writes, bytes) in [
         (0, 1_u16, 2),
         (126, 1, 2),
@@ -149,30 +149,30 @@ fn quantities(bench: &mut Bench<'_>) -> Check {
         let head = [pdu(0x17, read, reads), middle, vec![bytes]].concat();
         let data = words.high.to_be_bytes().into_iter().cycle();
         let data: Vec<u8> = data.take(usize::from(bytes).min(242)).collect();
-        bench.exception_03_with(&head, &data)?;
+        tester.exception_03_with(&head, &data)?;
     }
-    still_low(bench)
+    still_low(tester)
 }
 
-fn quantities_most(bench: &mut Bench<'_>) -> Check {
-    let wide = super::write_words::wide(bench)?;
-    let run = bench.target.longest(3).filter(|run| run.len() >= 125);
-    let (Some(wide), Some(run)) = (wide.filter(|_| bench.target.has(3)), run) else {
-        let nowhere = bench.nowhere(3)?;
+fn quantities_most(tester: &mut Tester<'_>) -> Check {
+    let wide = super::write_words::wide(tester)?;
+    let run = tester.target.longest(3).filter(|run| run.len() >= 125);
+    let (Some(wide), Some(run)) = (wide.filter(|_| tester.target.has(3)), run) else {
+        let nowhere = tester.nowhere(3)?;
         let read = Span::of(nowhere.saturating_sub(124), 125);
-        return bench.exception(&both(read, read.first, &[0; 121]), 2);
+        return tester.exception(&both(read, read.first, &[0; 121]), 2);
     };
     // Write the values that the registers already have.
-    let values = bench.read_words(wide.up_to(121))?;
-    let reply = bench.reply(&both(run.up_to(125), wide.first, &values))?;
+    let values = tester.read_words(wide.up_to(121))?;
+    let reply = tester.reply(&both(run.up_to(125), wide.first, &values))?;
     let must = "250 data bytes and the byte count 250";
-    bench.ensure(reply.len() == 252 && reply[1] == 250, must)?;
+    tester.ensure(reply.len() == 252 && reply[1] == 250, must)?;
     let wanted = "the registers hold what was written";
-    bench.words_are(wide.up_to(121), &values, wanted)
+    tester.words_are(wide.up_to(121), &values, wanted)
 }
 
-fn quantity_first(bench: &mut Bench<'_>) -> Check {
-    let nowhere = bench.nowhere(3)?;
+fn quantity_first(tester: &mut Tester<'_>) -> Check {
+    let nowhere = tester.nowhere(3)?;
     let good = both(Span::one(nowhere), nowhere, &[0]);
     for (at, byte, wrong) in [
         (4, 0, "it reads 0 registers"),
@@ -183,45 +183,45 @@ fn quantity_first(bench: &mut Bench<'_>) -> Check {
     ] {
         let mut request = good.clone();
         request[at] = byte;
-        let right = bench.ask_due(&request)?.exception(0x17) == Some(3);
-        bench.ensure(right, format!("exception 03 to function 17: {wrong}"))?;
+        let right = tester.ask_due(&request)?.exception(0x17) == Some(3);
+        tester.ensure(right, format!("exception 03 to function 17: {wrong}"))?;
     }
-    bench.exception(&good, 2)
+    tester.exception(&good, 2)
 }
 
-fn still_low(bench: &mut Bench<'_>) -> Check {
-    let words = bench.words()?;
-    bench.word_is(words.span.first, words.low)
+fn still_low(tester: &mut Tester<'_>) -> Check {
+    let words = tester.words()?;
+    tester.word_is(words.span.first, words.low)
 }
 
-fn byte_count(bench: &mut Bench<'_>) -> Check {
-    let words = bench.words()?;
+fn byte_count(tester: &mut Tester<'_>) -> Check {
+    let words = tester.words()?;
     let one = words.span.up_to(1);
-    bench.set_words(one.first, &[words.low])?;
+    tester.set_words(one.first, &[words.low])?;
     let good = both(one, one.first, &[words.high]);
     for count in [0_u8, 1, 3, 4, 255] {
         let head = [&good[..9], &[count]].concat();
-        bench.exception_03_with(&head, &vec![1; usize::from(count).min(240)])?;
+        tester.exception_03_with(&head, &vec![1; usize::from(count).min(240)])?;
     }
-    still_low(bench)
+    still_low(tester)
 }
 
-fn truncated(bench: &mut Bench<'_>) -> Check {
-    let words = bench.words()?;
+fn truncated(tester: &mut Tester<'_>) -> Check {
+    let words = tester.words()?;
     let one = words.span.up_to(1);
-    bench.set_words(one.first, &[words.low])?;
+    tester.set_words(one.first, &[words.low])?;
     let request = both(one, one.first, &[words.high]);
-    bench.wrong_lengths(&request, &[1])?;
-    still_low(bench)
+    tester.wrong_lengths(&request, &[1])?;
+    still_low(tester)
 }
 
-fn address(bench: &mut Bench<'_>) -> Check {
-    let words = bench.words()?;
-    let nowhere = bench.nowhere(3)?;
+fn address(tester: &mut Tester<'_>) -> Check {
+    let words = tester.words()?;
+    let nowhere = tester.nowhere(3)?;
     let one = words.span.up_to(1);
     let out = Span::one(nowhere);
-    bench.set_words(one.first, &[words.low])?;
-    bench.exception(&both(out, one.first, &[words.high]), 2)?;
-    bench.exception(&both(one, nowhere, &[words.high]), 2)?;
-    still_low(bench)
+    tester.set_words(one.first, &[words.low])?;
+    tester.exception(&both(out, one.first, &[words.high]), 2)?;
+    tester.exception(&both(one, nowhere, &[words.high]), 2)?;
+    still_low(tester)
 }

@@ -7,10 +7,10 @@ use register_map::configuration::{self, AS_IT_WAS};
 use register_map::points::Kind;
 use register_map::state;
 
-use crate::bench::Bench;
 use crate::case::{Case, Check, Need, Stop, case, skip};
 use crate::points::{pdu, words_of, write_bits, write_words};
 use crate::target::{Modio, Span};
+use crate::tester::Tester;
 
 const N: &[Need] = &[Need::Modio, Need::Config, Need::Function(6)];
 
@@ -31,18 +31,18 @@ pub(super) const CASES: &[Case] = &[
 ];
 
 /// Returns the first output of a module: the function that reads it, its address, and a value other than 0.
-fn output(bench: &Bench<'_>) -> Check<(u8, u16, u16)> {
-    if let Some(span) = bench.target.bits {
+fn output(tester: &Tester<'_>) -> Check<(u8, u16, u16)> {
+    if let Some(span) = tester.target.bits {
         return Ok((1, span.first, 1));
     }
-    match bench.target.words.filter(|words| !words.locked) {
+    match tester.target.words.filter(|words| !words.locked) {
         Some(words) => Ok((3, words.span.first, words.high)),
         None => skip("the module has no outputs"),
     }
 }
 
-fn inputs(bench: &mut Bench<'_>) -> Check {
-    let modio = bench.target.modio;
+fn inputs(tester: &mut Tester<'_>) -> Check {
+    let modio = tester.target.modio;
     let mut requests = Vec::new();
     for (address, kind) in modio.iter().flat_map(Modio::points) {
         match kind {
@@ -63,152 +63,156 @@ fn inputs(bench: &mut Bench<'_>) -> Check {
         return skip("the module has no inputs");
     }
     for request in requests {
-        bench.exception(&request, 2)?;
+        tester.exception(&request, 2)?;
     }
     Ok(())
 }
 
-fn read(bench: &mut Bench<'_>, function: u8, address: u16) -> Check<u16> {
-    Ok(read_all(bench, function, Span::one(address))?[0])
+fn read(tester: &mut Tester<'_>, function: u8, address: u16) -> Check<u16> {
+    Ok(read_all(tester, function, Span::one(address))?[0])
 }
 
-fn write(bench: &mut Bench<'_>, function: u8, address: u16, value: u16) -> Check {
-    write_all(bench, function, address, &[value])
+fn write(tester: &mut Tester<'_>, function: u8, address: u16, value: u16) -> Check {
+    write_all(tester, function, address, &[value])
 }
 
-fn set(bench: &mut Bench<'_>, register: u16, value: u16) -> Check {
-    bench.unlock()?;
+fn set(tester: &mut Tester<'_>, register: u16, value: u16) -> Check {
+    tester.unlock()?;
     let request = pdu(6, register, value);
-    bench.reply_is(&request, &request)
+    tester.reply_is(&request, &request)
 }
 
 /// Returns a value for COMM_TIMEOUT in tenths of a second: `exact` in virtual time. In real time it is four times as long,
 /// so that the pauses of a busy host are not longer than the time-out.
-fn tenths(bench: &Bench<'_>, exact: u16) -> u16 {
-    bench.exact(exact, exact * 4)
+fn tenths(tester: &Tester<'_>, exact: u16) -> u16 {
+    tester.exact(exact, exact * 4)
 }
 
 /// Calls `done` with COMM_TIMEOUT set and SAFE of the output at 0, and restores both.
 fn with_timeout(
-    bench: &mut Bench<'_>,
+    tester: &mut Tester<'_>,
     tenths: u16,
     address: u16,
-    done: fn(&mut Bench<'_>, Duration) -> Check,
+    done: fn(&mut Tester<'_>, Duration) -> Check,
 ) -> Check {
     let safe = configuration::SAFE + address;
-    let before = bench.read_word(configuration::COMM_TIMEOUT)?;
-    let safe_before = bench.read_word(safe)?;
-    set(bench, safe, 0)?;
-    set(bench, configuration::COMM_TIMEOUT, tenths)?;
-    let result = done(bench, Duration::from_millis(100) * u32::from(tenths));
-    set(bench, configuration::COMM_TIMEOUT, before)?;
-    set(bench, safe, safe_before)?;
-    set(bench, configuration::COMMAND, 5)?;
+    let before = tester.read_word(configuration::COMM_TIMEOUT)?;
+    let safe_before = tester.read_word(safe)?;
+    set(tester, safe, 0)?;
+    set(tester, configuration::COMM_TIMEOUT, tenths)?;
+    let result = done(tester, Duration::from_millis(100) * u32::from(tenths));
+    set(tester, configuration::COMM_TIMEOUT, before)?;
+    set(tester, safe, safe_before)?;
+    set(tester, configuration::COMMAND, 5)?;
     result
 }
 
-fn has_tripped(bench: &mut Bench<'_>) -> Check<bool> {
-    Ok(bench.read_word(state::STATUS)? & state::status::COMM_WATCHDOG != 0)
+fn has_tripped(tester: &mut Tester<'_>) -> Check<bool> {
+    Ok(tester.read_word(state::STATUS)? & state::status::COMM_WATCHDOG != 0)
 }
 
-fn line_dies(bench: &mut Bench<'_>) -> Check {
-    let (function, address, high) = output(bench)?;
-    let before = read(bench, function, address)?;
-    let tenths = tenths(bench, 5);
-    let result = with_timeout(bench, tenths, address, |bench, timeout| {
-        let (function, address, high) = output(bench)?;
-        let is = |bench: &mut Bench<'_>, value, wanted: &str| {
-            let now = read(bench, function, address)?;
-            bench.ensure(now == value, wanted)
+fn line_dies(tester: &mut Tester<'_>) -> Check {
+    let (function, address, high) = output(tester)?;
+    let before = read(tester, function, address)?;
+    let tenths = tenths(tester, 5);
+    let result = with_timeout(tester, tenths, address, |tester, timeout| {
+        let (function, address, high) = output(tester)?;
+        let is = |tester: &mut Tester<'_>, value, wanted: &str| {
+            let now = read(tester, function, address)?;
+            tester.ensure(now == value, wanted)
         };
-        write(bench, function, address, high)?;
-        is(bench, high, "the output as written")?;
-        bench.rest(timeout * 2)?;
-        is(bench, 0, "the output at SAFE, 0")?;
-        let tripped = has_tripped(bench)?;
-        bench.ensure(tripped, "status bit 0 set: the watchdog has tripped")?;
+        write(tester, function, address, high)?;
+        is(tester, high, "the output as written")?;
+        tester.rest(timeout * 2)?;
+        is(tester, 0, "the output at SAFE, 0")?;
+        let tripped = has_tripped(tester)?;
+        tester.ensure(tripped, "status bit 0 set: the watchdog has tripped")?;
         // Requests end the timeout, but do not restore the outputs.
-        is(bench, 0, "the output at SAFE until it is written")?;
-        write(bench, function, address, high)?;
-        is(bench, high, "the output as written again")?;
-        set(bench, configuration::COMMAND, 5)?;
-        let tripped = has_tripped(bench)?;
-        bench.ensure(!tripped, "status bit 0 clear after COMMAND 5")
+        is(tester, 0, "the output at SAFE until it is written")?;
+        write(tester, function, address, high)?;
+        is(tester, high, "the output as written again")?;
+        set(tester, configuration::COMMAND, 5)?;
+        let tripped = has_tripped(tester)?;
+        tester.ensure(!tripped, "status bit 0 clear after COMMAND 5")
     });
-    write(bench, function, address, before.min(high))?;
+    write(tester, function, address, before.min(high))?;
     result
 }
 
-fn line_lives(bench: &mut Bench<'_>) -> Check {
-    let (function, address, high) = output(bench)?;
-    let before = read(bench, function, address)?;
-    let tenths = tenths(bench, 10);
-    let result = with_timeout(bench, tenths, address, |bench, timeout| {
-        let (function, address, high) = output(bench)?;
-        write(bench, function, address, high)?;
+fn line_lives(tester: &mut Tester<'_>) -> Check {
+    let (function, address, high) = output(tester)?;
+    let before = read(tester, function, address)?;
+    let tenths = tenths(tester, 10);
+    let result = with_timeout(tester, tenths, address, |tester, timeout| {
+        let (function, address, high) = output(tester)?;
+        write(tester, function, address, high)?;
         for _ in 0..10 {
-            bench.rest(timeout / 4)?;
-            let now = read(bench, function, address)?;
-            bench.ensure(now == high, "the output as written")?;
+            tester.rest(timeout / 4)?;
+            let now = read(tester, function, address)?;
+            tester.ensure(now == high, "the output as written")?;
         }
         // Every unit ignores a broadcast read, but it is a valid message and restarts the timeout.
         for _ in 0..8 {
-            bench.rest(timeout / 4)?;
-            bench.silent_ping(0, "a broadcast")?;
+            tester.rest(timeout / 4)?;
+            tester.silent_ping(0, "a broadcast")?;
         }
-        let tripped = has_tripped(bench)?;
-        bench.ensure(!tripped, "status bit 0 clear: broadcasts count")?;
-        let now = read(bench, function, address)?;
-        bench.ensure(now == high, "the output as written")
+        let tripped = has_tripped(tester)?;
+        tester.ensure(!tripped, "status bit 0 clear: broadcasts count")?;
+        let now = read(tester, function, address)?;
+        tester.ensure(now == high, "the output as written")
     });
-    write(bench, function, address, before.min(high))?;
+    write(tester, function, address, before.min(high))?;
     result
 }
 
-fn heartbeats_come(bench: &mut Bench<'_>) -> Check {
-    let (function, address, high) = output(bench)?;
-    let before = read(bench, function, address)?;
-    let source = bench.read_word(configuration::COMM_SOURCE)?;
-    let tenths = tenths(bench, 10);
-    set(bench, configuration::COMM_SOURCE, CommSource::Writes.code())?;
-    let result = with_timeout(bench, tenths, address, |bench, timeout| {
-        let (function, address, high) = output(bench)?;
-        write(bench, function, address, high)?;
+fn heartbeats_come(tester: &mut Tester<'_>) -> Check {
+    let (function, address, high) = output(tester)?;
+    let before = read(tester, function, address)?;
+    let source = tester.read_word(configuration::COMM_SOURCE)?;
+    let tenths = tenths(tester, 10);
+    set(
+        tester,
+        configuration::COMM_SOURCE,
+        CommSource::Writes.code(),
+    )?;
+    let result = with_timeout(tester, tenths, address, |tester, timeout| {
+        let (function, address, high) = output(tester)?;
+        write(tester, function, address, high)?;
         for value in 0..8 {
-            bench.rest(timeout / 4)?;
+            tester.rest(timeout / 4)?;
             let request = pdu(6, configuration::HEARTBEAT, value);
-            bench.reply_is(&request, &request)?;
+            tester.reply_is(&request, &request)?;
         }
         for value in 0..8 {
-            bench.rest(timeout / 4)?;
+            tester.rest(timeout / 4)?;
             let request = pdu(6, configuration::HEARTBEAT, value);
-            bench.silence_of(0, &request, "a broadcast")?;
+            tester.silence_of(0, &request, "a broadcast")?;
         }
-        let tripped = has_tripped(bench)?;
-        bench.ensure(!tripped, "status bit 0 clear: HEARTBEAT is a write")?;
-        let now = read(bench, function, address)?;
-        bench.ensure(now == high, "the output as written")
+        let tripped = has_tripped(tester)?;
+        tester.ensure(!tripped, "status bit 0 clear: HEARTBEAT is a write")?;
+        let now = read(tester, function, address)?;
+        tester.ensure(now == high, "the output as written")
     });
-    set(bench, configuration::COMM_SOURCE, source)?;
-    write(bench, function, address, before.min(high))?;
+    set(tester, configuration::COMM_SOURCE, source)?;
+    write(tester, function, address, before.min(high))?;
     result
 }
 
-fn read_all(bench: &mut Bench<'_>, function: u8, span: Span) -> Check<Vec<u16>> {
+fn read_all(tester: &mut Tester<'_>, function: u8, span: Span) -> Check<Vec<u16>> {
     if function == 3 {
-        return bench.read_words(span);
+        return tester.read_words(span);
     }
-    let bits = bench.read_bits(span)?;
+    let bits = tester.read_bits(span)?;
     Ok(bits.into_iter().map(u16::from).collect())
 }
 
 /// Sets the outputs of one kind to these values.
-fn write_all(bench: &mut Bench<'_>, function: u8, first: u16, values: &[u16]) -> Check {
+fn write_all(tester: &mut Tester<'_>, function: u8, first: u16, values: &[u16]) -> Check {
     if function == 3 {
-        return bench.set_words(first, values);
+        return tester.set_words(first, values);
     }
     let bits: Vec<bool> = values.iter().map(|value| *value != 0).collect();
-    bench.set_bits(first, &bits)
+    tester.set_bits(first, &bits)
 }
 
 /// The first read is this long before the end of COMM_TIMEOUT, and the last read this long after it.
@@ -220,72 +224,72 @@ const FAST: Duration = Duration::from_millis(30);
 const READS: u32 = 40;
 
 /// Returns the outputs of a module, of one kind.
-fn outputs(bench: &Bench<'_>) -> Check<Span> {
-    let words = bench.target.words.filter(|words| !words.locked);
-    let span = bench.target.bits.or(words.map(|words| words.span));
+fn outputs(tester: &Tester<'_>) -> Check<Span> {
+    let words = tester.target.words.filter(|words| !words.locked);
+    let span = tester.target.bits.or(words.map(|words| words.span));
     span.ok_or_else(|| Stop::Skip("the module has no outputs".to_owned()))
 }
 
-pub(super) fn torn(bench: &mut Bench<'_>) -> Check {
-    let (function, ..) = output(bench)?;
-    let span = outputs(bench)?;
-    let before = read_all(bench, function, span)?;
+pub(super) fn torn(tester: &mut Tester<'_>) -> Check {
+    let (function, ..) = output(tester)?;
+    let span = outputs(tester)?;
+    let before = read_all(tester, function, span)?;
     let safe = configuration::SAFE + span.first;
     let count = span.len() as usize;
-    let safe_before = bench.reply(&pdu(3, safe, count as u16))?;
-    bench.unlock()?;
-    bench.set_words(safe, &vec![0; count])?;
+    let safe_before = tester.reply(&pdu(3, safe, count as u16))?;
+    tester.unlock()?;
+    tester.set_words(safe, &vec![0; count])?;
     // The write of all outputs, its reply and the read have to fit into the timeout.
-    let tenths = if bench.patience.reply < FAST { 2 } else { 5 };
-    let result = with_timeout(bench, tenths, span.first, reads_around_the_end);
-    bench.unlock()?;
-    bench.set_words(safe, &words_of(&safe_before))?;
-    write_all(bench, function, span.first, &before)?;
+    let tenths = if tester.patience.reply < FAST { 2 } else { 5 };
+    let result = with_timeout(tester, tenths, span.first, reads_around_the_end);
+    tester.unlock()?;
+    tester.set_words(safe, &words_of(&safe_before))?;
+    write_all(tester, function, span.first, &before)?;
     result
 }
 
 /// Writes all outputs and reads them near the end of the timeout, with another offset each time.
-fn reads_around_the_end(bench: &mut Bench<'_>, timeout: Duration) -> Check {
-    let (function, _, high) = output(bench)?;
-    let span = outputs(bench)?;
+fn reads_around_the_end(tester: &mut Tester<'_>, timeout: Duration) -> Check {
+    let (function, _, high) = output(tester)?;
+    let span = outputs(tester)?;
     let count = span.len() as usize;
     let (high, low) = (vec![high; count], vec![0; count]);
-    let line = bench.endpoint.line();
-    let request = bench.frame(&pdu(function, span.first, count as u16));
+    let line = tester.endpoint.line();
+    let request = tester.frame(&pdu(function, span.first, count as u16));
     // The unit reads its outputs when the request has ended and the silence after it has passed. The timeout may
     // begin with the end of the write or when the silence after it has passed.
     let ahead = line.characters(request.len()) + line.t35() + BEFORE;
     let step = (BEFORE + line.t35() + AFTER) / READS;
     let (mut held, mut safe) = (0, 0);
     for n in 0..READS {
-        write_all(bench, function, span.first, &high)?;
-        let until = bench.sent_end + timeout + step * n;
-        let now = bench.endpoint.now();
-        bench.rest(until.saturating_sub(now).saturating_sub(ahead))?;
-        let values = read_all(bench, function, span)?;
+        write_all(tester, function, span.first, &high)?;
+        let until = tester.sent_end + timeout + step * n;
+        let now = tester.endpoint.now();
+        tester.rest(until.saturating_sub(now).saturating_sub(ahead))?;
+        let values = read_all(tester, function, span)?;
         held += u32::from(values == high);
         safe += u32::from(values == low);
         let wanted = "every output as written, or every output at SAFE";
-        bench.ensure(values == high || values == low, wanted)?;
+        tester.ensure(values == high || values == low, wanted)?;
     }
     // If the watchdog trips in none or in all of the reads, no read was near the end of the timeout.
-    bench.ensure(
+    tester.ensure(
         held > 0 && safe > 0,
         format!("some reads before and some after the end of the timeout, not {held} and {safe}"),
     )
 }
 
-fn start_value(bench: &mut Bench<'_>) -> Check {
-    let (function, address, high) = output(bench)?;
-    let start = bench.read_word(configuration::START + address)?;
-    if start == AS_IT_WAS || bench.read_word(configuration::SCALE + address)? != 0 {
+fn start_value(tester: &mut Tester<'_>) -> Check {
+    let (function, address, high) = output(tester)?;
+    let start = tester.read_word(configuration::START + address)?;
+    if start == AS_IT_WAS || tester.read_word(configuration::SCALE + address)? != 0 {
         return skip("START is not in the output's own units");
     }
-    let before = read(bench, function, address)?;
-    write(bench, function, address, if start == 0 { high } else { 0 })?;
-    super::power::cycle(bench)?;
-    bench.rest(super::power::START)?;
-    let now = read(bench, function, address)?;
-    bench.ensure(now == start, format!("the output at START, {start}"))?;
-    write(bench, function, address, before)
+    let before = read(tester, function, address)?;
+    write(tester, function, address, if start == 0 { high } else { 0 })?;
+    super::power::cycle(tester)?;
+    tester.rest(super::power::START)?;
+    let now = read(tester, function, address)?;
+    tester.ensure(now == start, format!("the output at START, {start}"))?;
+    write(tester, function, address, before)
 }

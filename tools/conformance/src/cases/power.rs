@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case};
 use crate::endpoint::Piece;
+use crate::tester::Tester;
 
 #[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
@@ -20,39 +20,39 @@ pub(super) const CASES: &[Case] = &[
 const OFF: Duration = Duration::from_millis(200);
 pub(super) const START: Duration = Duration::from_secs(1);
 
-pub(super) fn cycle(bench: &mut Bench<'_>) -> Check {
-    bench.endpoint.set_power(false)?;
-    bench.rest(OFF)?;
-    bench.endpoint.set_power(true)?;
+pub(super) fn cycle(tester: &mut Tester<'_>) -> Check {
+    tester.endpoint.set_power(false)?;
+    tester.rest(OFF)?;
+    tester.endpoint.set_power(true)?;
     Ok(())
 }
 
-fn answers(bench: &mut Bench<'_>) -> Check {
+fn answers(tester: &mut Tester<'_>) -> Check {
     for _ in 0..3 {
-        cycle(bench)?;
-        bench.rest(START)?;
-        bench.alive("power on")?;
+        cycle(tester)?;
+        tester.rest(START)?;
+        tester.alive("power on")?;
     }
     Ok(())
 }
 
-fn mid_traffic(bench: &mut Bench<'_>) -> Check {
-    let line = bench.endpoint.line();
+fn mid_traffic(tester: &mut Tester<'_>) -> Check {
+    let line = tester.endpoint.line();
     // Send from before the start of the unit until well after it.
     let length = (START.as_nanos() / line.characters(1).as_nanos()) as usize;
     for byte in [0x55, 0x00, 0xFF] {
-        cycle(bench)?;
-        let bytes = [vec![byte; length], bench.ping()].concat();
+        cycle(tester)?;
+        let bytes = [vec![byte; length], tester.ping()].concat();
         let wanted = "no silence has come before the request";
-        bench.silence(&[Piece::Bytes(bytes)], wanted)?;
-        bench.alive("the first silence")?;
+        tester.silence(&[Piece::Bytes(bytes)], wanted)?;
+        tester.alive("the first silence")?;
     }
     Ok(())
 }
 
-fn no_byte(bench: &mut Bench<'_>) -> Check {
-    cycle(bench)?;
-    let received = bench.endpoint.receive(START, START, usize::MAX)?;
+fn no_byte(tester: &mut Tester<'_>) -> Check {
+    cycle(tester)?;
+    let received = tester.endpoint.receive(START, START, usize::MAX)?;
     let wanted = format!("silence while the unit starts: {received:?}");
-    bench.ensure(received.is_empty(), wanted)
+    tester.ensure(received.is_empty(), wanted)
 }

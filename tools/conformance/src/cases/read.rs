@@ -1,8 +1,8 @@
 //! Reading bits and words: functions 01 to 04.
 
-use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case};
 use crate::points::pdu;
+use crate::tester::Tester;
 
 /// Returns the largest quantity of one request (V1.1b3, 6.1 to 6.4).
 const fn most(function: u8) -> u16 {
@@ -59,101 +59,101 @@ pub(super) const ALIKE: &[Case] = &[
 ];
 
 /// Returns the first readable address, or 0.
-fn somewhere(bench: &Bench<'_>, function: u8) -> u16 {
-    let first = bench.target.readable(function).first();
+fn somewhere(tester: &Tester<'_>, function: u8) -> u16 {
+    let first = tester.target.readable(function).first();
     first.map_or(0, |span| span.first)
 }
 
-fn quantity_0<const F: u8>(bench: &mut Bench<'_>) -> Check {
-    bench.exception(&pdu(F, somewhere(bench, F), 0), 3)
+fn quantity_0<const F: u8>(tester: &mut Tester<'_>) -> Check {
+    tester.exception(&pdu(F, somewhere(tester, F), 0), 3)
 }
 
-fn quantity_above<const F: u8>(bench: &mut Bench<'_>) -> Check {
-    let at = somewhere(bench, F);
+fn quantity_above<const F: u8>(tester: &mut Tester<'_>) -> Check {
+    let at = somewhere(tester, F);
     for quantity in [most(F) + 1, most(F) + 2, 0x0800, 0x8000, 0xFFFF] {
-        bench.exception(&pdu(F, at, quantity), 3)?;
+        tester.exception(&pdu(F, at, quantity), 3)?;
     }
     Ok(())
 }
 
-fn quantity_most<const F: u8>(bench: &mut Bench<'_>) -> Check {
+fn quantity_most<const F: u8>(tester: &mut Tester<'_>) -> Check {
     let quantity = most(F);
-    let span = bench.target.longest(F);
+    let span = tester.target.longest(F);
     let request = pdu(F, span.map_or(0, |span| span.first), quantity);
     if span.is_some_and(|span| span.len() >= u32::from(quantity)) {
-        let reply = bench.reply(&request)?;
+        let reply = tester.reply(&request)?;
         let wanted = "250 data bytes and the byte count 250";
-        return bench.ensure(reply.len() == 252 && reply[1] == 250, wanted);
+        return tester.ensure(reply.len() == 252 && reply[1] == 250, wanted);
     }
-    bench.exception(&request, 2)
+    tester.exception(&request, 2)
 }
 
-fn byte_count<const F: u8>(bench: &mut Bench<'_>) -> Check {
-    let span = bench.readable(F)?;
+fn byte_count<const F: u8>(tester: &mut Tester<'_>) -> Check {
+    let span = tester.readable(F)?;
     let longest = span.len().min(u32::from(most(F))) as u16;
     // The short quantities, whose padding differs, and the longest.
     for quantity in (1..=longest.min(17)).chain([longest]) {
-        let reply = bench.reply(&pdu(F, span.first, quantity))?;
+        let reply = tester.reply(&pdu(F, span.first, quantity))?;
         let bytes = data_bytes(F, quantity);
-        bench.ensure(
+        tester.ensure(
             reply.len() == 2 + bytes && usize::from(reply[1]) == bytes,
             format!("{bytes} data bytes and their count"),
         )?;
         if F <= 2 && quantity % 8 != 0 {
             let unused = reply[1 + bytes] >> (quantity % 8);
-            bench.ensure(unused == 0, "unused high bits of the last byte are zero")?;
+            tester.ensure(unused == 0, "unused high bits of the last byte are zero")?;
         }
     }
     Ok(())
 }
 
-fn one_past<const F: u8>(bench: &mut Bench<'_>) -> Check {
-    for span in bench.target.readable(F).to_vec() {
+fn one_past<const F: u8>(tester: &mut Tester<'_>) -> Check {
+    for span in tester.target.readable(F).to_vec() {
         let Some(beyond) = span.last.checked_add(1) else {
             continue;
         };
-        bench.exception(&pdu(F, span.last, 2), 2)?;
+        tester.exception(&pdu(F, span.last, 2), 2)?;
         let whole = span.len().min(u32::from(most(F)) - 1) as u16;
-        bench.exception(&pdu(F, span.last - (whole - 1), whole + 1), 2)?;
-        let elsewhere = bench.target.readable(F).iter().any(|s| s.has(beyond));
+        tester.exception(&pdu(F, span.last - (whole - 1), whole + 1), 2)?;
+        let elsewhere = tester.target.readable(F).iter().any(|s| s.has(beyond));
         if !elsewhere {
-            bench.exception(&pdu(F, beyond, 1), 2)?;
+            tester.exception(&pdu(F, beyond, 1), 2)?;
         }
         if let Some(before) = span.first.checked_sub(1) {
-            bench.exception(&pdu(F, before, 2), 2)?;
+            tester.exception(&pdu(F, before, 2), 2)?;
         }
     }
     Ok(())
 }
 
-fn no_wrap<const F: u8>(bench: &mut Bench<'_>) -> Check {
-    bench.exception(&pdu(F, 0xFFFF, 2), 2)?;
-    bench.exception(&pdu(F, 0xFFF0, most(F)), 2)
+fn no_wrap<const F: u8>(tester: &mut Tester<'_>) -> Check {
+    tester.exception(&pdu(F, 0xFFFF, 2), 2)?;
+    tester.exception(&pdu(F, 0xFFF0, most(F)), 2)
 }
 
-fn quantity_first<const F: u8>(bench: &mut Bench<'_>) -> Check {
-    let nowhere = bench.nowhere(F)?;
-    bench.exception(&pdu(F, nowhere, 0), 3)?;
-    bench.exception(&pdu(F, nowhere, most(F) + 1), 3)?;
-    bench.exception(&pdu(F, nowhere, 1), 2)
+fn quantity_first<const F: u8>(tester: &mut Tester<'_>) -> Check {
+    let nowhere = tester.nowhere(F)?;
+    tester.exception(&pdu(F, nowhere, 0), 3)?;
+    tester.exception(&pdu(F, nowhere, most(F) + 1), 3)?;
+    tester.exception(&pdu(F, nowhere, 1), 2)
 }
 
-fn length<const F: u8>(bench: &mut Bench<'_>) -> Check {
-    let request = pdu(F, bench.readable(F)?.first, 1);
-    bench.wrong_lengths(&request, &[1, 2])
+fn length<const F: u8>(tester: &mut Tester<'_>) -> Check {
+    let request = pdu(F, tester.readable(F)?.first, 1);
+    tester.wrong_lengths(&request, &[1, 2])
 }
 
-fn alike<const A: u8, const B: u8>(bench: &mut Bench<'_>) -> Check {
-    for span in bench.target.readable(A).to_vec() {
+fn alike<const A: u8, const B: u8>(tester: &mut Tester<'_>) -> Check {
+    for span in tester.target.readable(A).to_vec() {
         let quantity = span.len().min(u32::from(most(A))) as u16;
-        let before = bench.reply(&pdu(A, span.first, quantity))?;
-        let other = bench.reply(&pdu(B, span.first, quantity))?;
+        let before = tester.reply(&pdu(A, span.first, quantity))?;
+        let other = tester.reply(&pdu(B, span.first, quantity))?;
         let wanted = format!("as long as by function {A:02X}");
-        bench.ensure(other.len() == before.len(), wanted)?;
+        tester.ensure(other.len() == before.len(), wanted)?;
         // Inputs and counters may change between the reads. Compare only the bytes that did not change.
-        let after = bench.reply(&pdu(A, span.first, quantity))?;
+        let after = tester.reply(&pdu(A, span.first, quantity))?;
         for at in (1..before.len()).filter(|at| before[*at] == after[*at]) {
-            bench.ensure(
+            tester.ensure(
                 other[at] == before[at],
                 format!(
                     "{:02X} in byte {at} by function {B:02X}, as by {A:02X}, not {:02X}",

@@ -1,38 +1,38 @@
 //! Points of any unit on the line: the ends of the wires of a bench.
 
-use crate::bench::Bench;
 use crate::case::Check;
 use crate::frame::Reply;
 use crate::hil::bench_file::{Place, Wire};
 use crate::points::{pdu, words_of};
 use crate::target::Target;
+use crate::tester::Tester;
 
 /// Number of attempts to restore an output.
 const ATTEMPTS: u32 = 3;
 
 /// Reads the output of a wire. A bit is 0 or 1.
-pub(super) fn output(bench: &mut Bench<'_>, wire: &Wire) -> Check<u16> {
-    read(bench, by(wire, 1, 3), wire.from)
+pub(super) fn output(tester: &mut Tester<'_>, wire: &Wire) -> Check<u16> {
+    read(tester, by(wire, 1, 3), wire.from)
 }
 
 /// Reads the input of a wire.
-pub(super) fn input(bench: &mut Bench<'_>, wire: &Wire) -> Check<u16> {
-    read(bench, by(wire, 2, 4), wire.to)
+pub(super) fn input(tester: &mut Tester<'_>, wire: &Wire) -> Check<u16> {
+    read(tester, by(wire, 2, 4), wire.to)
 }
 
 /// Sets the output of a wire.
-pub(super) fn set(bench: &mut Bench<'_>, wire: &Wire, value: u16) -> Check {
+pub(super) fn set(tester: &mut Tester<'_>, wire: &Wire, value: u16) -> Check {
     let value = by(wire, if value == 0 { 0 } else { 0xFF00 }, value);
     let request = pdu(by(wire, 5, 6), wire.from.point, value);
-    ask(bench, wire.from, &request, |reply| reply == request).map(drop)
+    ask(tester, wire.from, &request, |reply| reply == request).map(drop)
 }
 
 /// Restores the output of a wire. A failed attempt is repeated: one lost frame must not leave the output changed.
-pub(super) fn restore(bench: &mut Bench<'_>, wire: &Wire, value: u16) -> Check {
-    let mut done = set(bench, wire, value);
+pub(super) fn restore(tester: &mut Tester<'_>, wire: &Wire, value: u16) -> Check {
+    let mut done = set(tester, wire, value);
     for _ in 1..ATTEMPTS {
         if done.is_err() {
-            done = set(bench, wire, value);
+            done = set(tester, wire, value);
         }
     }
     done
@@ -40,7 +40,7 @@ pub(super) fn restore(bench: &mut Bench<'_>, wire: &Wire, value: u16) -> Check {
 
 /// Reads registers of a unit by function 03.
 pub(super) fn registers(
-    bench: &mut Bench<'_>,
+    tester: &mut Tester<'_>,
     unit: u8,
     first: u16,
     count: u16,
@@ -48,7 +48,7 @@ pub(super) fn registers(
     let request = pdu(3, first, count);
     let right = |pdu: &[u8]| pdu.len() == 2 + 2 * usize::from(count);
     let place = Place { unit, point: first };
-    Ok(words_of(&ask(bench, place, &request, right)?))
+    Ok(words_of(&ask(tester, place, &request, right)?))
 }
 
 /// Returns the first value for a digital wire, the second for an analog one.
@@ -56,10 +56,10 @@ const fn by<T: Copy>(wire: &Wire, digital: T, analog: T) -> T {
     if wire.is_digital() { digital } else { analog }
 }
 
-fn read(bench: &mut Bench<'_>, function: u8, place: Place) -> Check<u16> {
+fn read(tester: &mut Tester<'_>, function: u8, place: Place) -> Check<u16> {
     let request = pdu(function, place.point, 1);
     let right = |pdu: &[u8]| matches!(pdu, [1 | 2, 1, 0 | 1] | [3 | 4, 2, _, _]);
-    let reply = ask(bench, place, &request, right)?;
+    let reply = ask(tester, place, &request, right)?;
     Ok(match reply[..] {
         [_, _, bit] => bit.into(),
         _ => words_of(&reply)[0],
@@ -68,16 +68,16 @@ fn read(bench: &mut Bench<'_>, function: u8, place: Place) -> Check<u16> {
 
 /// Sends a request to a unit on the line. Returns the reply if it is right.
 fn ask(
-    bench: &mut Bench<'_>,
+    tester: &mut Tester<'_>,
     place: Place,
     request: &[u8],
     right: impl Fn(&[u8]) -> bool,
 ) -> Check<Vec<u8>> {
     let target = Target {
         unit: place.unit,
-        ..bench.target.clone()
+        ..tester.target.clone()
     };
-    let mut other = Bench::new(bench.endpoint, &target);
+    let mut other = Tester::new(tester.endpoint, &target);
     match other.ask(request)? {
         Reply::Pdu(reply) if reply[0] == request[0] && right(&reply) => Ok(reply),
         Reply::Silence => other.fail(format!("an answer from unit {}", place.unit)),

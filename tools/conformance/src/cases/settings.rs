@@ -3,10 +3,10 @@
 use modbus_line::{Format, LineFormat};
 use register_map::codes::{self, Baud};
 
-use crate::bench::Bench;
 use crate::case::{Case, Check, Need, Stop, case};
 use crate::frame::Mode;
 use crate::rate;
+use crate::tester::Tester;
 
 const N: &[Need] = &[
     Need::Modio,
@@ -27,28 +27,28 @@ pub(super) const CASES: &[Case] = &[
 ];
 
 /// Changes to each of these rates and formats, and restores the first.
-fn tour(bench: &mut Bench<'_>, stops: impl IntoIterator<Item = LineFormat>) -> Check {
-    rate::tour(bench, stops, |_| Ok(()))
+fn tour(tester: &mut Tester<'_>, stops: impl IntoIterator<Item = LineFormat>) -> Check {
+    rate::tour(tester, stops, |_| Ok(()))
 }
 
-fn one_change(bench: &mut Bench<'_>) -> Check {
-    let home = bench.endpoint.line();
+fn one_change(tester: &mut Tester<'_>) -> Check {
+    let home = tester.endpoint.line();
     let baud = if home.baud == 19_200 { 38_400 } else { 19_200 };
-    tour(bench, [LineFormat { baud, ..home }])
+    tour(tester, [LineFormat { baud, ..home }])
 }
 
-fn every_rate(bench: &mut Bench<'_>) -> Check {
-    let home = bench.endpoint.line();
+fn every_rate(tester: &mut Tester<'_>) -> Check {
+    let home = tester.endpoint.line();
     let rates = Baud::ALL.iter().map(|baud| LineFormat {
         baud: baud.bits_per_second(),
         ..home
     });
-    tour(bench, rates.filter(|line| *line != home))
+    tour(tester, rates.filter(|line| *line != home))
 }
 
-fn every_format(bench: &mut Bench<'_>) -> Check {
-    let home = bench.endpoint.line();
-    let mode = match bench.target.mode {
+fn every_format(tester: &mut Tester<'_>) -> Check {
+    let home = tester.endpoint.line();
+    let mode = match tester.target.mode {
         Mode::Rtu => codes::Mode::Rtu,
         Mode::Ascii => codes::Mode::Ascii,
     };
@@ -57,5 +57,5 @@ fn every_format(bench: &mut Bench<'_>) -> Check {
     let formats: Result<Vec<Format>, _> = formats.map(|format| format.name().parse()).collect();
     let formats = formats.map_err(Stop::Skip)?.into_iter();
     let lines = formats.map(|format| LineFormat::new(home.baud, format));
-    tour(bench, lines)
+    tour(tester, lines)
 }

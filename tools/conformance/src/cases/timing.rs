@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case};
 use crate::endpoint::Piece;
 use crate::frame::Reply;
+use crate::tester::Tester;
 
 #[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
@@ -26,10 +26,10 @@ pub(super) const CASES: &[Case] = &[
 ];
 
 /// Returns the shortest t3.5 that a unit may use, or the silence that a modio is set to instead.
-pub(super) fn silence(bench: &mut Bench<'_>) -> Check<Duration> {
-    let line = bench.endpoint.line();
-    if bench.target.modio.is_some() {
-        let gap = bench.read_word(register_map::configuration::FRAME_GAP)?;
+pub(super) fn silence(tester: &mut Tester<'_>) -> Check<Duration> {
+    let line = tester.endpoint.line();
+    if tester.target.modio.is_some() {
+        let gap = tester.read_word(register_map::configuration::FRAME_GAP)?;
         if gap != 0 {
             // A setting below 1.5 characters counts as these.
             let shortest = line.characters(3) / 2;
@@ -42,75 +42,75 @@ pub(super) fn silence(bench: &mut Bench<'_>) -> Check<Duration> {
 /// Allowance for times that were rounded to nanoseconds.
 const ROUNDING: Duration = Duration::from_nanos(10);
 
-fn not_before(bench: &Bench<'_>, least: Duration) -> Check {
-    let took = bench.turnaround();
+fn not_before(tester: &Tester<'_>, least: Duration) -> Check {
+    let took = tester.turnaround();
     let wanted = format!("a reply {least:?} after the request or later, not {took:?}");
-    bench.ensure(took + ROUNDING >= least, wanted)
+    tester.ensure(took + ROUNDING >= least, wanted)
 }
 
-fn after_t35(bench: &mut Bench<'_>) -> Check {
-    let least = silence(bench)?;
-    let ping = bench.target.ping.clone();
+fn after_t35(tester: &mut Tester<'_>) -> Check {
+    let least = silence(tester)?;
+    let ping = tester.target.ping.clone();
     for n in 0..20 {
-        bench.reply(&ping)?;
-        not_before(bench, least)?;
+        tester.reply(&ping)?;
+        not_before(tester, least)?;
         // Change the phase between the requests and the unit's periodic work.
-        bench.rest(Duration::from_micros(137 * n))?;
+        tester.rest(Duration::from_micros(137 * n))?;
     }
     Ok(())
 }
 
-fn exceptions_after_t35(bench: &mut Bench<'_>) -> Check {
-    let least = silence(bench)?;
-    let Some(function) = super::dispatch::unknown_functions(bench).pop() else {
+fn exceptions_after_t35(tester: &mut Tester<'_>) -> Check {
+    let least = silence(tester)?;
+    let Some(function) = super::dispatch::unknown_functions(tester).pop() else {
         return Ok(());
     };
     for length in [0, 1, 10, 252] {
-        bench.exception(&[vec![function], vec![0x33; length]].concat(), 1)?;
-        not_before(bench, least)?;
+        tester.exception(&[vec![function], vec![0x33; length]].concat(), 1)?;
+        not_before(tester, least)?;
     }
     Ok(())
 }
 
-fn no_gap(bench: &mut Bench<'_>) -> Check {
-    let t15 = bench.endpoint.line().t15_limits().least;
+fn no_gap(tester: &mut Tester<'_>) -> Check {
+    let t15 = tester.endpoint.line().t15_limits().least;
     for function in 1..=4 {
-        let span = bench.target.longest(function);
-        let Some(span) = span.filter(|_| bench.target.has(function)) else {
+        let span = tester.target.longest(function);
+        let Some(span) = span.filter(|_| tester.target.has(function)) else {
             continue;
         };
         let most = if function <= 2 { 2000 } else { 125 };
         let request = crate::points::pdu(function, span.first, span.len().min(most) as u16);
-        bench.reply(&request)?;
-        let gaps = bench
+        tester.reply(&request)?;
+        let gaps = tester
             .received
             .windows(2)
             .map(|two| two[1].start.saturating_sub(two[0].end));
         let longest = gaps.max().unwrap_or_default();
         let wanted = format!("gaps below t1.5, {t15:?}, in the reply, not {longest:?}");
-        bench.ensure(longest < t15, wanted)?;
+        tester.ensure(longest < t15, wanted)?;
     }
     Ok(())
 }
 
-fn driver(bench: &mut Bench<'_>) -> Check {
-    let ping = bench.target.ping.clone();
-    let line = bench.endpoint.line();
-    bench.endpoint.take_driver_edges()?;
+fn driver(tester: &mut Tester<'_>) -> Check {
+    let ping = tester.target.ping.clone();
+    let line = tester.endpoint.line();
+    tester.endpoint.take_driver_edges()?;
     for _ in 0..10 {
-        bench.reply(&ping)?;
-        let edges = bench.endpoint.take_driver_edges()?;
+        tester.reply(&ping)?;
+        let edges = tester.endpoint.take_driver_edges()?;
         let [(on, true), (off, false)] = edges[..] else {
-            return bench.fail(format!(
+            return tester.fail(format!(
                 "the driver goes on once and off once, not {edges:?}"
             ));
         };
-        let (Some(first), Some(last)) = (bench.received.first(), bench.received.last()) else {
-            return bench.fail("a reply");
+        let (Some(first), Some(last)) = (tester.received.first(), tester.received.last()) else {
+            return tester.fail("a reply");
         };
         let wanted = "the driver on before the first start bit";
-        bench.ensure(on <= first.start + ROUNDING, wanted)?;
-        bench.ensure(
+        tester.ensure(on <= first.start + ROUNDING, wanted)?;
+        tester.ensure(
             off + ROUNDING >= last.end,
             format!(
                 "the driver on to the end of the last stop bit, {:?}, not {off:?}",
@@ -119,53 +119,53 @@ fn driver(bench: &mut Bench<'_>) -> Check {
         )?;
         // The next request may follow t3.5 after the reply.
         let wanted = "the driver off well before the next request may come";
-        bench.ensure(off <= last.end + line.t15_limits().most, wanted)?;
+        tester.ensure(off <= last.end + line.t15_limits().most, wanted)?;
         let wanted = "the first start bit soon after the driver is on";
-        bench.ensure(first.start <= on + line.t35_limits().most, wanted)?;
+        tester.ensure(first.start <= on + line.t35_limits().most, wanted)?;
     }
     Ok(())
 }
 
-fn driver_off(bench: &mut Bench<'_>) -> Check {
-    bench.endpoint.take_driver_edges()?;
-    let (other, ping) = (bench.other(), bench.target.ping.clone());
-    let mode = bench.target.mode;
+fn driver_off(tester: &mut Tester<'_>) -> Check {
+    tester.endpoint.take_driver_edges()?;
+    let (other, ping) = (tester.other(), tester.target.ping.clone());
+    let mode = tester.target.mode;
     for frame in [
         mode.frame(other, &ping),
         mode.frame(0, &ping),
         vec![0x55; 5],
     ] {
-        bench.silence_to(&frame, "the frame is not for this unit")?;
+        tester.silence_to(&frame, "the frame is not for this unit")?;
     }
-    let edges = bench.endpoint.take_driver_edges()?;
-    bench.ensure(edges.is_empty(), format!("the driver stays off: {edges:?}"))
+    let edges = tester.endpoint.take_driver_edges()?;
+    tester.ensure(edges.is_empty(), format!("the driver stays off: {edges:?}"))
 }
 
-fn back_to_back(bench: &mut Bench<'_>) -> Check {
-    let t35 = bench.endpoint.line().t35_limits().most;
-    hundred_requests(bench, |bench| {
-        let end = bench
+fn back_to_back(tester: &mut Tester<'_>) -> Check {
+    let t35 = tester.endpoint.line().t35_limits().most;
+    hundred_requests(tester, |tester| {
+        let end = tester
             .received
             .last()
             .map_or(Duration::ZERO, |received| received.end);
-        (end + t35).saturating_sub(bench.endpoint.now())
+        (end + t35).saturating_sub(tester.endpoint.now())
     })
 }
 
 /// Sends a hundred requests, each as soon as the reply before it has been received and the gap after it has passed.
 pub(super) fn hundred_requests(
-    bench: &mut Bench<'_>,
-    gap: impl Fn(&Bench<'_>) -> Duration,
+    tester: &mut Tester<'_>,
+    gap: impl Fn(&Tester<'_>) -> Duration,
 ) -> Check {
-    let ping = bench.ping();
-    let reply = bench.raw(&ping)?;
-    bench.ensure(bench.is_pong(&reply), "a reply")?;
-    let length = bench.received.len();
+    let ping = tester.ping();
+    let reply = tester.raw(&ping)?;
+    tester.ensure(tester.is_pong(&reply), "a reply")?;
+    let length = tester.received.len();
     for n in 0..100 {
-        let pieces = [Piece::Gap(gap(bench)), Piece::Bytes(ping.clone())];
-        let reply = bench.exchange_until(&pieces, length)?;
-        bench.ensure(bench.is_pong(&reply), format!("a reply to request {n}"))?;
+        let pieces = [Piece::Gap(gap(tester)), Piece::Bytes(ping.clone())];
+        let reply = tester.exchange_until(&pieces, length)?;
+        tester.ensure(tester.is_pong(&reply), format!("a reply to request {n}"))?;
     }
-    let late = bench.listen_until(usize::MAX)?;
-    bench.ensure(late == Reply::Silence, "silence after the last reply")
+    let late = tester.listen_until(usize::MAX)?;
+    tester.ensure(late == Reply::Silence, "silence after the last reply")
 }

@@ -9,22 +9,22 @@ use register_map::points::output_values;
 use register_map::{Values, configuration, counters};
 
 use super::remote::{input, output, registers, restore, set};
-use crate::bench::Bench;
 use crate::case::{Case, Check, Failure, Need, Part, Stop, parts};
 use crate::hil::bench_file::{Carries, Place, Wire};
+use crate::tester::Tester;
 
 #[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
     parts("wires/each", "map, points",
         "an input follows the output that is wired to it, on and off, and no other input changes",
         &[Need::Modio, Need::Wires],
-        |bench, done| each(bench, Wire::is_digital, on_and_off, done)),
+        |tester, done| each(tester, Wire::is_digital, on_and_off, done)),
     parts("pulses/each", "map, counters", "an input counts every pulse of the output that is wired to it once",
-        &[Need::Modio, Need::Pulses], |bench, done| each(bench, Wire::has_pulses, count, done)),
+        &[Need::Modio, Need::Pulses], |tester, done| each(tester, Wire::has_pulses, count, done)),
     parts("analog/each", "map, points",
         "an input follows the output that is wired to it within the tolerance, and no other input changes",
         &[Need::Modio, Need::AnalogWires],
-        |bench, done| each(bench, |wire| !wire.is_digital(), over_the_range, done)),
+        |tester, done| each(tester, |wire| !wire.is_digital(), over_the_range, done)),
 ];
 
 /// A wire, the lowest and the highest value of its output, and the value of its input at the lowest.
@@ -35,28 +35,28 @@ struct Known {
 }
 
 /// Tests a wire whose output has this lowest and highest value. All outputs are at their lowest.
-type Test = fn(&mut Bench<'_>, &Wire, (u16, u16), &[Known], &mut Part) -> Check;
+type Test = fn(&mut Tester<'_>, &Wire, (u16, u16), &[Known], &mut Part) -> Check;
 
 /// Tests these wires, and restores their outputs.
 fn each(
-    bench: &mut Bench<'_>,
+    tester: &mut Tester<'_>,
     chosen: fn(&Wire) -> bool,
     test: Test,
     done: &mut dyn FnMut(Part),
 ) -> Check {
-    let wires = bench.target.hil.wires.iter().copied();
+    let wires = tester.target.hil.wires.iter().copied();
     let wires: Vec<Wire> = wires.filter(chosen).collect();
     let mut before = Vec::new();
-    let tested = from_lowest(bench, &wires, &mut before, test, done);
+    let tested = from_lowest(tester, &wires, &mut before, test, done);
     let mut restored = Ok(());
     for (wire, value) in before {
-        restored = restored.and(restore(bench, &wire, value));
+        restored = restored.and(restore(tester, &wire, value));
     }
     restored.and(tested)
 }
 
 fn from_lowest(
-    bench: &mut Bench<'_>,
+    tester: &mut Tester<'_>,
     wires: &[Wire],
     before: &mut Vec<(Wire, u16)>,
     test: Test,
@@ -64,7 +64,7 @@ fn from_lowest(
 ) -> Check {
     let mut all = Vec::new();
     for wire in wires {
-        let range = lowest(bench, wire, before);
+        let range = lowest(tester, wire, before);
         if let Err(broken @ Stop::Broken(_)) = range {
             return Err(broken);
         }
@@ -75,42 +75,46 @@ fn from_lowest(
         });
     }
     let slowest = wires.iter().map(|wire| wire.within).max();
-    bench.rest(slowest.unwrap_or_default())?;
+    tester.rest(slowest.unwrap_or_default())?;
     for known in all.iter_mut().filter(|known| known.range.is_ok()) {
         // If an input cannot be read, the test of this wire fails later.
-        known.at_lowest = input(bench, &known.wire).ok();
+        known.at_lowest = input(tester, &known.wire).ok();
     }
     for Known { wire, range, .. } in &all {
-        bench.go_on()?;
-        done(bench.part(wire.to_string(), |bench, part| {
+        tester.go_on()?;
+        done(tester.part(wire.to_string(), |tester, part| {
             let range = range.clone()?;
-            let tested = test(bench, wire, range, &all, part);
+            let tested = test(tester, wire, range, &all, part);
             // Restore the lowest value also after a failure: the tests of the other wires need it.
-            tested.and(set(bench, wire, range.0))
+            tested.and(set(tester, wire, range.0))
         })?);
     }
     Ok(())
 }
 
 /// Sets the output to its lowest value; returns that value and the highest.
-fn lowest(bench: &mut Bench<'_>, wire: &Wire, before: &mut Vec<(Wire, u16)>) -> Check<(u16, u16)> {
+fn lowest(
+    tester: &mut Tester<'_>,
+    wire: &Wire,
+    before: &mut Vec<(Wire, u16)>,
+) -> Check<(u16, u16)> {
     let range = if wire.is_digital() {
         (0, 1)
     } else {
-        range(bench, wire)?
+        range(tester, wire)?
     };
-    let value = output(bench, wire)?;
+    let value = output(tester, wire)?;
     if !before.iter().any(|(other, _)| other.from == wire.from) {
         before.push((*wire, value));
     }
-    set(bench, wire, range.0)?;
+    set(tester, wire, range.0)?;
     Ok(range)
 }
 
 /// Returns the lowest and the highest value of an analog output, by RANGE and SCALE, which must be those of the input.
-fn range(bench: &mut Bench<'_>, wire: &Wire) -> Check<(u16, u16)> {
+fn range(tester: &mut Tester<'_>, wire: &Wire) -> Check<(u16, u16)> {
     let mut setting = |place: Place| {
-        let mut read = |first| registers(bench, place.unit, first + place.point, 1);
+        let mut read = |first| registers(tester, place.unit, first + place.point, 1);
         Check::Ok((
             read(configuration::RANGE)?[0],
             read(configuration::SCALE)?[0],
@@ -139,31 +143,31 @@ fn range(bench: &mut Bench<'_>, wire: &Wire) -> Check<(u16, u16)> {
 
 /// Switches the output on and off. The note has the times in which the input followed.
 fn on_and_off(
-    bench: &mut Bench<'_>,
+    tester: &mut Tester<'_>,
     wire: &Wire,
     _: (u16, u16),
     all: &[Known],
     part: &mut Part,
 ) -> Check {
-    await_level(bench, wire, false)?;
-    set(bench, wire, 1)?;
-    let on = await_level(bench, wire, true)?.as_millis();
-    others_keep(bench, wire, "on", all)?;
-    set(bench, wire, 0)?;
-    let off = await_level(bench, wire, false)?.as_millis();
+    await_level(tester, wire, false)?;
+    set(tester, wire, 1)?;
+    let on = await_level(tester, wire, true)?.as_millis();
+    others_keep(tester, wire, "on", all)?;
+    set(tester, wire, 0)?;
+    let off = await_level(tester, wire, false)?.as_millis();
     part.note = format!("on after {on} ms, off after {off} ms");
     Ok(())
 }
 
 /// Waits until the input shows that its output is on, or off.
-fn await_level(bench: &mut Bench<'_>, wire: &Wire, on: bool) -> Check<Duration> {
+fn await_level(tester: &mut Tester<'_>, wire: &Wire, on: bool) -> Check<Duration> {
     let inverted = matches!(wire.carries, Carries::Bit { inverted: true, .. });
     let wanted = u16::from(on != inverted);
-    let begin = bench.endpoint.now();
+    let begin = tester.endpoint.now();
     loop {
-        let asked = bench.endpoint.now().saturating_sub(begin);
-        if input(bench, wire)? == wanted {
-            return Ok(bench.endpoint.now().saturating_sub(begin));
+        let asked = tester.endpoint.now().saturating_sub(begin);
+        if input(tester, wire)? == wanted {
+            return Ok(tester.endpoint.now().saturating_sub(begin));
         }
         if asked >= wire.within {
             return Err(Stop::Fail(Failure {
@@ -180,13 +184,13 @@ const fn level(bit: u16) -> &'static str {
 }
 
 /// Checks that the inputs of other outputs are as they were at the lowest values. `value` is that of this wire's output.
-fn others_keep(bench: &mut Bench<'_>, wire: &Wire, value: &str, all: &[Known]) -> Check {
+fn others_keep(tester: &mut Tester<'_>, wire: &Wire, value: &str, all: &[Known]) -> Check {
     for other in all.iter().filter(|other| other.wire.from != wire.from) {
         let Some(at_lowest) = other.at_lowest else {
             continue;
         };
         let Wire { from, to, .. } = other.wire;
-        let now = input(bench, &other.wire)?;
+        let now = input(tester, &other.wire)?;
         let change = match other.wire.carries {
             Carries::Bit { .. } if now != at_lowest => format!("to {}", level(now)),
             Carries::Word { tolerance } if now.abs_diff(at_lowest) > tolerance => {
@@ -204,20 +208,26 @@ fn others_keep(bench: &mut Bench<'_>, wire: &Wire, value: &str, all: &[Known]) -
 }
 
 /// Sends pulses to the input, and compares its counter with their number.
-fn count(bench: &mut Bench<'_>, wire: &Wire, _: (u16, u16), _: &[Known], part: &mut Part) -> Check {
+fn count(
+    tester: &mut Tester<'_>,
+    wire: &Wire,
+    _: (u16, u16),
+    _: &[Known],
+    part: &mut Part,
+) -> Check {
     let Carries::Bit { pulses, .. } = wire.carries else {
         return Ok(());
     };
     part.note = format!("{pulses} pulses");
-    await_level(bench, wire, false)?;
-    let before = counter(bench, wire.to)?;
+    await_level(tester, wire, false)?;
+    let before = counter(tester, wire.to)?;
     for _ in 0..pulses {
-        set(bench, wire, 1)?;
-        await_level(bench, wire, true)?;
-        set(bench, wire, 0)?;
-        await_level(bench, wire, false)?;
+        set(tester, wire, 1)?;
+        await_level(tester, wire, true)?;
+        set(tester, wire, 0)?;
+        await_level(tester, wire, false)?;
     }
-    let counted = counter(bench, wire.to)?.wrapping_sub(before);
+    let counted = counter(tester, wire.to)?.wrapping_sub(before);
     if counted == u32::from(pulses) {
         return Ok(());
     }
@@ -229,15 +239,15 @@ fn count(bench: &mut Bench<'_>, wire: &Wire, _: (u16, u16), _: &[Known], part: &
 }
 
 /// Reads the pulse counter of an input.
-fn counter(bench: &mut Bench<'_>, input: Place) -> Check<u32> {
+fn counter(tester: &mut Tester<'_>, input: Place) -> Check<u32> {
     let first = counters::of_point(input.point);
-    let words = registers(bench, input.unit, first, counters::WORDS)?;
+    let words = registers(tester, input.unit, first, counters::WORDS)?;
     Ok(u32::from(words[0]) << 16 | u32::from(words[1]))
 }
 
 /// Sets the output to five values over its range. After the time given the input must be within the tolerance of each.
 fn over_the_range(
-    bench: &mut Bench<'_>,
+    tester: &mut Tester<'_>,
     wire: &Wire,
     (min, max): (u16, u16),
     all: &[Known],
@@ -249,9 +259,9 @@ fn over_the_range(
     let mut worst = 0;
     for quarter in 0..=4 {
         let value = min + (u32::from(max - min) * quarter / 4) as u16;
-        set(bench, wire, value)?;
-        bench.rest(wire.within)?;
-        let followed = input(bench, wire)?;
+        set(tester, wire, value)?;
+        tester.rest(wire.within)?;
+        let followed = input(tester, wire)?;
         let difference = followed.abs_diff(value);
         if difference > tolerance {
             return Err(Stop::Fail(Failure {
@@ -263,5 +273,5 @@ fn over_the_range(
         worst = difference.max(worst);
         part.note = format!("largest difference {worst}");
     }
-    others_keep(bench, wire, &format!("at {max}"), all)
+    others_keep(tester, wire, &format!("at {max}"), all)
 }

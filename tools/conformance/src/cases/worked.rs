@@ -1,8 +1,8 @@
 //! The worked frames of manuals, sent to the unit.
 
-use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case, skip};
 use crate::frame::{Reply, crc, rtu};
+use crate::tester::Tester;
 use crate::vectors::{Worked, frames};
 
 const S: &str = "manuals, see docs/conformance.md";
@@ -20,31 +20,31 @@ pub(super) const CASES: &[Case] = &[
         &[Need::Rtu], errata),
 ];
 
-fn for_others(bench: &mut Bench<'_>) -> Check {
-    let unit = bench.unit();
+fn for_others(tester: &mut Tester<'_>) -> Check {
+    let unit = tester.unit();
     for worked in frames().filter(|w| w.crc_ok() && w.bytes[0] != unit) {
         let why = format!("the frame is for unit {}", worked.bytes[0]);
-        bench.silence_to(&worked.bytes, why)?;
-        bench.alive(format!("{} {}", worked.source, worked.place))?;
+        tester.silence_to(&worked.bytes, why)?;
+        tester.alive(format!("{} {}", worked.source, worked.place))?;
     }
     Ok(())
 }
 
 /// Sends a worked frame to this unit. A write to a register that exists is left out, because it would change the
 /// unit. On a modio these are writes to 0x0006 with analog points in port 2, which the modio-08 has.
-fn send(bench: &mut Bench<'_>, worked: &Worked, frame: &[u8]) -> Check {
+fn send(tester: &mut Tester<'_>, worked: &Worked, frame: &[u8]) -> Check {
     let function = frame[1];
     if let [_, 6 | 0x10, high, low, ..] = *frame {
         let address = u16::from_be_bytes([high, low]);
-        let readable = bench.target.readable(3);
+        let readable = tester.target.readable(3);
         if worked.request && readable.iter().any(|span| span.has(address)) {
             return Ok(());
         }
     }
     let reply = if worked.request {
-        bench.raw_due(frame)?
+        tester.raw_due(frame)?
     } else {
-        bench.raw(frame)?
+        tester.raw(frame)?
     };
     let place = format!("{} {}", worked.source, worked.place);
     let right = match &reply {
@@ -56,11 +56,11 @@ fn send(bench: &mut Bench<'_>, worked: &Worked, frame: &[u8]) -> Check {
         }
     };
     let wanted = format!("a reply or an exception in good form: {place}");
-    bench.ensure(right, wanted)
+    tester.ensure(right, wanted)
 }
 
-fn for_this(bench: &mut Bench<'_>) -> Check {
-    let unit = bench.unit();
+fn for_this(tester: &mut Tester<'_>) -> Check {
+    let unit = tester.unit();
     let mine: Vec<_> = frames()
         .filter(|w| w.crc_ok() && w.bytes[0] == unit)
         .collect();
@@ -69,31 +69,31 @@ fn for_this(bench: &mut Bench<'_>) -> Check {
     }
     for worked in mine {
         // The file has a request and its echo as one frame.
-        send(bench, &worked, &worked.bytes)?;
+        send(tester, &worked, &worked.bytes)?;
     }
-    bench.alive("the worked frames")
+    tester.alive("the worked frames")
 }
 
-fn readdressed(bench: &mut Bench<'_>) -> Check {
+fn readdressed(tester: &mut Tester<'_>) -> Check {
     for worked in frames().filter(|worked| worked.request) {
         let body = &worked.bytes[1..worked.bytes.len() - 2];
-        let frame = rtu(&[&[bench.unit()], body].concat());
-        send(bench, &worked, &frame)?;
+        let frame = rtu(&[&[tester.unit()], body].concat());
+        send(tester, &worked, &frame)?;
     }
-    bench.alive("the worked requests")
+    tester.alive("the worked requests")
 }
 
-fn errata(bench: &mut Bench<'_>) -> Check {
+fn errata(tester: &mut Tester<'_>) -> Check {
     for worked in frames().filter(|worked| !worked.crc_ok()) {
         let mut mine = worked.bytes.clone();
-        mine[0] = bench.unit();
+        mine[0] = tester.unit();
         // The printed CRC may be right for this unit's address.
         let (body, check) = mine.split_at(mine.len() - 2);
         let right = crc(body) == check;
         let frames = [worked.bytes.clone(), mine];
         for frame in frames.iter().take(if right { 1 } else { 2 }) {
-            bench.silence_to(frame, "the CRC is wrong")?;
-            bench.alive(format!("{} {}", worked.source, worked.place))?;
+            tester.silence_to(frame, "the CRC is wrong")?;
+            tester.alive(format!("{} {}", worked.source, worked.place))?;
         }
     }
     Ok(())

@@ -1,9 +1,9 @@
 //! Writing registers: functions 06 and 10.
 
-use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case, skip};
 use crate::points::{pdu, write_words};
 use crate::target::Span;
+use crate::tester::Tester;
 
 const W06: &[Need] = &[Need::Function(6), Need::Function(3), Need::Words];
 const W10: &[Need] = &[Need::Function(0x10), Need::Function(3), Need::Words];
@@ -42,47 +42,47 @@ pub(super) const CASES: &[Case] = &[
         one_bad_value).interpretation(),
 ];
 
-fn echo(bench: &mut Bench<'_>) -> Check {
-    let words = bench.words()?;
+fn echo(tester: &mut Tester<'_>) -> Check {
+    let words = tester.words()?;
     let span = words.span.up_to(16);
     for address in span.first..=span.last {
         for value in [words.low, words.high, words.low] {
-            let mut wanted = bench.read_words(span)?;
+            let mut wanted = tester.read_words(span)?;
             let request = pdu(6, address, value);
-            bench.reply_is(&request, &request)?;
+            tester.reply_is(&request, &request)?;
             wanted[usize::from(address - span.first)] = value;
             let text = format!("register {address:04X} is {value:04X}, no other has changed");
-            bench.words_are(span, &wanted, text)?;
+            tester.words_are(span, &wanted, text)?;
         }
     }
     Ok(())
 }
 
-fn refused(bench: &mut Bench<'_>) -> Check {
-    let words = bench.words()?;
-    let value = bench.refused_value()?;
-    bench.set_words(words.span.first, &[words.low])?;
-    bench.exception(&pdu(6, words.span.first, value), 3)?;
-    bench.word_is(words.span.first, words.low)
+fn refused(tester: &mut Tester<'_>) -> Check {
+    let words = tester.words()?;
+    let value = tester.refused_value()?;
+    tester.set_words(words.span.first, &[words.low])?;
+    tester.exception(&pdu(6, words.span.first, value), 3)?;
+    tester.word_is(words.span.first, words.low)
 }
 
-fn address(bench: &mut Bench<'_>) -> Check {
-    for address in bench.outside(3) {
-        bench.exception(&pdu(6, address, 0), 2)?;
+fn address(tester: &mut Tester<'_>) -> Check {
+    for address in tester.outside(3) {
+        tester.exception(&pdu(6, address, 0), 2)?;
     }
     Ok(())
 }
 
-fn length(bench: &mut Bench<'_>) -> Check {
-    let words = bench.words()?;
-    bench.set_words(words.span.first, &[words.low])?;
+fn length(tester: &mut Tester<'_>) -> Check {
+    let words = tester.words()?;
+    tester.set_words(words.span.first, &[words.low])?;
     let request = pdu(6, words.span.first, words.high);
-    bench.wrong_lengths(&request, &[1])?;
-    bench.word_is(words.span.first, words.low)
+    tester.wrong_lengths(&request, &[1])?;
+    tester.word_is(words.span.first, words.low)
 }
 
-fn every_quantity(bench: &mut Bench<'_>) -> Check {
-    let words = bench.words()?;
+fn every_quantity(tester: &mut Tester<'_>) -> Check {
+    let words = tester.words()?;
     let longest = words.span.len().min(123) as u16;
     for quantity in (1..=longest.min(9)).chain([longest]) {
         let here = words.span.up_to(quantity);
@@ -91,17 +91,17 @@ fn every_quantity(bench: &mut Bench<'_>) -> Check {
                 .map(|n| if n % 2 == odd { words.low } else { words.high })
                 .collect();
             let request = write_words(here.first, &values);
-            bench.reply_is(&request, &request[..5])?;
-            bench.words_are(here, &values, format!("the registers are {values:04X?}"))?;
+            tester.reply_is(&request, &request[..5])?;
+            tester.words_are(here, &values, format!("the registers are {values:04X?}"))?;
         }
     }
     Ok(())
 }
 
-fn quantity_out_of_range(bench: &mut Bench<'_>) -> Check {
-    let at = bench.target.words.map_or(0, |words| words.span.first);
-    bench.exception(&[pdu(0x10, at, 0), vec![0]].concat(), 3)?;
-    bench.exception(&[pdu(0x10, at, 0), vec![2, 0, 1]].concat(), 3)?;
+fn quantity_out_of_range(tester: &mut Tester<'_>) -> Check {
+    let at = tester.target.words.map_or(0, |words| words.span.first);
+    tester.exception(&[pdu(0x10, at, 0), vec![0]].concat(), 3)?;
+    tester.exception(&[pdu(0x10, at, 0), vec![2, 0, 1]].concat(), 3)?;
     // The frame of 124 registers would have 257 bytes, so the last data bytes are left out.
     for (quantity, count) in [
         (124, 246),
@@ -112,132 +112,133 @@ fn quantity_out_of_range(bench: &mut Bench<'_>) -> Check {
         (0xFFFF, 254),
     ] {
         let head = [pdu(0x10, at, quantity), vec![count]].concat();
-        bench.exception_03_with(&head, &vec![0; usize::from(count.min(246))])?;
+        tester.exception_03_with(&head, &vec![0; usize::from(count.min(246))])?;
     }
     Ok(())
 }
 
 /// Returns the 123 registers that a case may write to, if the unit has that many. The case must restore their values.
-pub(super) fn wide(bench: &mut Bench<'_>) -> Check<Option<Span>> {
-    let config = bench.target.modio.is_some() && bench.target.allow_config && bench.target.has(3);
+pub(super) fn wide(tester: &mut Tester<'_>) -> Check<Option<Span>> {
+    let config =
+        tester.target.modio.is_some() && tester.target.allow_config && tester.target.has(3);
     if config {
-        bench.unlock()?;
+        tester.unlock()?;
         return Ok(Some(Span::of(register_map::configuration::BETA, 123)));
     }
-    let known = bench.target.words.map(|words| words.span);
+    let known = tester.target.words.map(|words| words.span);
     Ok(known.filter(|span| span.len() >= 123))
 }
 
-fn quantity_first(bench: &mut Bench<'_>) -> Check {
-    let nowhere = bench.nowhere(3)?;
+fn quantity_first(tester: &mut Tester<'_>) -> Check {
+    let nowhere = tester.nowhere(3)?;
     for (quantity, count) in [(0, 0), (124, 246), (1, 0), (1, 1), (1, 4)] {
         let data = vec![0; usize::from(count)];
         let request = [pdu(0x10, nowhere, quantity), vec![count], data].concat();
-        bench.exception(&request, 3)?;
+        tester.exception(&request, 3)?;
     }
-    bench.exception(&write_words(nowhere, &[0]), 2)
+    tester.exception(&write_words(nowhere, &[0]), 2)
 }
 
-fn address_first(bench: &mut Bench<'_>) -> Check {
-    let bad = bench.refused_value()?;
-    let nowhere = bench.nowhere(3)?;
-    bench.exception(&pdu(6, nowhere, bad), 2)
+fn address_first(tester: &mut Tester<'_>) -> Check {
+    let bad = tester.refused_value()?;
+    let nowhere = tester.nowhere(3)?;
+    tester.exception(&pdu(6, nowhere, bad), 2)
 }
 
-fn range_first(bench: &mut Bench<'_>) -> Check {
-    let bad = bench.refused_value()?;
-    let words = bench.words()?;
-    let nowhere = bench.nowhere(3)?;
-    bench.exception(&write_words(nowhere, &[bad]), 2)?;
+fn range_first(tester: &mut Tester<'_>) -> Check {
+    let bad = tester.refused_value()?;
+    let words = tester.words()?;
+    let nowhere = tester.nowhere(3)?;
+    tester.exception(&write_words(nowhere, &[bad]), 2)?;
     let last = words.span.last;
     let next = last.checked_add(1);
-    let there = |address: u16| bench.target.readable(3).iter().any(|run| run.has(address));
+    let there = |address: u16| tester.target.readable(3).iter().any(|run| run.has(address));
     if next.is_none_or(there) {
         return Ok(());
     }
-    let before = bench.read_word(last)?;
-    bench.exception(&write_words(last, &[bad, words.low]), 2)?;
-    bench.word_is(last, before)
+    let before = tester.read_word(last)?;
+    tester.exception(&write_words(last, &[bad, words.low]), 2)?;
+    tester.word_is(last, before)
 }
 
-fn quantity_most(bench: &mut Bench<'_>) -> Check {
-    if let Some(span) = wide(bench)? {
-        let values = bench.read_words(span)?;
+fn quantity_most(tester: &mut Tester<'_>) -> Check {
+    if let Some(span) = wide(tester)? {
+        let values = tester.read_words(span)?;
         let request = write_words(span.first, &values);
-        bench.reply_is(&request, &request[..5])?;
+        tester.reply_is(&request, &request[..5])?;
         let wanted = "the registers have the values that were written";
-        return bench.words_are(span, &values, wanted);
+        return tester.words_are(span, &values, wanted);
     }
     // A range that ends at an address that does not exist.
-    let nowhere = bench.nowhere(3)?;
+    let nowhere = tester.nowhere(3)?;
     let first = nowhere.saturating_sub(122);
-    bench.exception(&write_words(first, &[0; 123]), 2)
+    tester.exception(&write_words(first, &[0; 123]), 2)
 }
 
-fn unchanged(bench: &mut Bench<'_>, at: u16, value: u16, count: usize) -> Check {
+fn unchanged(tester: &mut Tester<'_>, at: u16, value: u16, count: usize) -> Check {
     let wanted = format!("every register still is {value:04X}");
-    bench.words_are(Span::of(at, count as u16), &vec![value; count], wanted)
+    tester.words_are(Span::of(at, count as u16), &vec![value; count], wanted)
 }
 
-fn byte_count(bench: &mut Bench<'_>) -> Check {
-    let words = bench.words()?;
+fn byte_count(tester: &mut Tester<'_>) -> Check {
+    let words = tester.words()?;
     let span = words.span.up_to(4);
     let (at, quantity) = (span.first, span.len() as u16);
-    bench.set_words(at, &vec![words.low; usize::from(quantity)])?;
+    tester.set_words(at, &vec![words.low; usize::from(quantity)])?;
     let right = (quantity * 2) as u8;
     for count in [0, 1, right - 1, right + 1, right + 2, 246, 255] {
         let high = words.high.to_be_bytes().repeat(128);
         let head = [pdu(0x10, at, quantity), vec![count]].concat();
-        bench.exception_03_with(&head, &high[..usize::from(count).min(246)])?;
+        tester.exception_03_with(&head, &high[..usize::from(count).min(246)])?;
     }
-    unchanged(bench, at, words.low, usize::from(quantity))
+    unchanged(tester, at, words.low, usize::from(quantity))
 }
 
-fn data_length(bench: &mut Bench<'_>) -> Check {
-    let words = bench.words()?;
+fn data_length(tester: &mut Tester<'_>) -> Check {
+    let words = tester.words()?;
     let span = words.span.up_to(3);
     let count = span.len() as usize;
-    bench.set_words(span.first, &vec![words.low; count])?;
+    tester.set_words(span.first, &vec![words.low; count])?;
     let request = write_words(span.first, &vec![words.high; count]);
-    bench.wrong_lengths(&request, &[1, 2, 100])?;
-    unchanged(bench, span.first, words.low, count)
+    tester.wrong_lengths(&request, &[1, 2, 100])?;
+    unchanged(tester, span.first, words.low, count)
 }
 
-fn partly_out(bench: &mut Bench<'_>) -> Check {
-    let words = bench.words()?;
-    let readable = bench.target.readable(3).to_vec();
+fn partly_out(tester: &mut Tester<'_>) -> Check {
+    let words = tester.words()?;
+    let readable = tester.target.readable(3).to_vec();
     let Some(run) = readable.iter().find(|run| run.has(words.span.last)) else {
-        return bench.fail("the registers to write to can be read");
+        return tester.fail("the registers to write to can be read");
     };
     // The last registers of the run, and the address after them, which does not exist.
     for count in 1..=run.len().min(8) as u16 {
         let tail = Span::of(run.last - (count - 1), count);
-        let before = bench.read_words(tail)?;
+        let before = tester.read_words(tail)?;
         let mut values: Vec<u16> = before.iter().map(|word| words.other(*word)).collect();
         values.push(words.low);
-        bench.exception(&write_words(tail.first, &values), 2)?;
+        tester.exception(&write_words(tail.first, &values), 2)?;
         let wanted = format!("the registers still are {before:04X?}");
-        let stands = bench.words_are(tail, &before, wanted);
+        let stands = tester.words_are(tail, &before, wanted);
         if stands.is_err() {
-            bench.set_words(tail.first, &before)?;
+            tester.set_words(tail.first, &before)?;
         }
         stands?;
     }
-    bench.exception(&write_words(0xFFFF, &[words.high; 2]), 2)
+    tester.exception(&write_words(0xFFFF, &[words.high; 2]), 2)
 }
 
-fn one_bad_value(bench: &mut Bench<'_>) -> Check {
-    let words = bench.words()?;
+fn one_bad_value(tester: &mut Tester<'_>) -> Check {
+    let words = tester.words()?;
     let (Some(bad), count @ 2..) = (words.refused, words.span.up_to(4).len() as usize) else {
         return skip("no value is known that is refused, or one register alone");
     };
     let at = words.span.first;
-    bench.set_words(at, &vec![words.low; count])?;
+    tester.set_words(at, &vec![words.low; count])?;
     for place in 0..count {
         let mut values = vec![words.high; count];
         values[place] = bad;
-        bench.exception(&write_words(at, &values), 3)?;
-        unchanged(bench, at, words.low, count)?;
+        tester.exception(&write_words(at, &values), 3)?;
+        unchanged(tester, at, words.low, count)?;
     }
     Ok(())
 }

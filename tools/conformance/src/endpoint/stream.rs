@@ -261,7 +261,7 @@ impl Endpoint for Stream {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bench::apart;
+    use crate::tester::apart;
     use std::net::TcpListener;
 
     /// An endpoint, and the other end of its connection.

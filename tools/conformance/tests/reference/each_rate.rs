@@ -4,13 +4,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use conformance::bench::Bench;
 use conformance::cases::of_bench;
 use conformance::endpoint::Endpoint as _;
 use conformance::frame::Mode;
 use conformance::hil::Hil;
 use conformance::report::{Report, Totals, json, junit};
 use conformance::run::{Verdict, run_until};
+use conformance::tester::Tester;
 use modbus_line::LineFormat;
 use register_map::configuration::{BAUD, RESPONSE_DELAY};
 
@@ -56,8 +56,8 @@ fn assert_at_home(line: &mut Reference) {
     line.set_power(false).unwrap();
     line.set_power(true).unwrap();
     line.rest(Duration::from_secs(1)).unwrap();
-    let mut bench = Bench::new(line, &target);
-    assert_eq!(bench.read_word(BAUD), Ok((HOME / 100) as u16));
+    let mut tester = Tester::new(line, &target);
+    assert_eq!(tester.read_word(BAUD), Ok((HOME / 100) as u16));
 }
 
 #[track_caller]
@@ -112,10 +112,10 @@ fn turnaround_below_frame_gap_and_above_a_limit_fail() {
     }
     // The register says 50 ms, but the unit uses t3.5.
     let target = probed(&mut line, Mode::Rtu, None);
-    let mut bench = Bench::new(&mut line, &target);
-    bench.unlock().unwrap();
+    let mut tester = Tester::new(&mut line, &target);
+    tester.unlock().unwrap();
     let gap = register_map::configuration::FRAME_GAP;
-    bench.set_words(gap, &[500]).unwrap();
+    tester.set_words(gap, &[500]).unwrap();
     let (report, _) = measured(&mut line, 5, &[]);
     let json = json::value(&report).to_string();
     assert!(json.contains("at least: t3.5, or FRAME_GAP"), "{json}");
@@ -247,16 +247,16 @@ fn rate_that_the_port_does_not_support_is_an_error_before_the_unit_is_changed() 
 fn a_unit_with_unsaved_settings_keeps_its_rate() {
     let mut line = modio();
     let target = probed(&mut line, Mode::Rtu, None);
-    let mut bench = Bench::new(&mut line, &target);
-    bench.unlock().unwrap();
-    bench.set_words(RESPONSE_DELAY, &[1]).unwrap();
+    let mut tester = Tester::new(&mut line, &target);
+    tester.unlock().unwrap();
+    tester.set_words(RESPONSE_DELAY, &[1]).unwrap();
     let (report, ended) = measured(&mut line, 5, &[19_200]);
     has(&ended.unwrap_err(), &["not saved", "set back to 9600 8N2"]);
     assert!(report.outcomes.is_empty());
     // The setting was not stored.
     assert_at_home(&mut line);
     assert_eq!(
-        Bench::new(&mut line, &target).read_word(RESPONSE_DELAY),
+        Tester::new(&mut line, &target).read_word(RESPONSE_DELAY),
         Ok(0)
     );
 }

@@ -14,7 +14,6 @@ mod unit;
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use conformance::bench::Bench;
 use conformance::case::{Case, Kind, Need};
 use conformance::cases::all;
 use conformance::cli::waits;
@@ -24,6 +23,7 @@ use conformance::probe::{Given, probe};
 use conformance::profile::Profile;
 use conformance::run::{Outcome, Verdict, run};
 use conformance::target::Target;
+use conformance::tester::Tester;
 
 use endpoint::Reference;
 use fault::{FAULTS, Fault};
@@ -254,13 +254,13 @@ fn points_that_cases_write_to_are_restored() {
     let mut endpoint = Reference::new(None, Mode::Rtu, line);
     let profile = Profile::parse(PROFILE).unwrap();
     let target = probed(&mut endpoint, Mode::Rtu, Some(&profile));
-    let mut bench = Bench::new(&mut endpoint, &target);
-    bench.set_bits(100, &[true, false, true]).unwrap();
-    bench.set_words(1000, &[17, 18, 19]).unwrap();
-    let before = bench.snapshot().unwrap();
+    let mut tester = Tester::new(&mut endpoint, &target);
+    tester.set_bits(100, &[true, false, true]).unwrap();
+    tester.set_words(1000, &[17, 18, 19]).unwrap();
+    let before = tester.snapshot().unwrap();
     let mut cases = all();
     cases.retain(|case| !case.name.starts_with("power/"));
     run(&mut endpoint, &target, &cases).unwrap();
-    let mut bench = Bench::new(&mut endpoint, &target);
-    assert_eq!(bench.snapshot().unwrap(), before);
+    let mut tester = Tester::new(&mut endpoint, &target);
+    assert_eq!(tester.snapshot().unwrap(), before);
 }

@@ -118,11 +118,11 @@ const STACK: Case = case(
     "map, 0x020B",
     "at least 1024 bytes of the stack are free",
     &[Need::Modio],
-    |bench| {
+    |tester| {
         // The unit checks a part of the stack at a time.
-        bench.rest(Duration::from_secs(1))?;
-        let free = bench.read_word(state::STACK_FREE)?;
-        bench.ensure(free >= 1024, format!("{free} bytes of the stack are free"))
+        tester.rest(Duration::from_secs(1))?;
+        let free = tester.read_word(state::STACK_FREE)?;
+        tester.ensure(free >= 1024, format!("{free} bytes of the stack are free"))
     },
 );
 

@@ -3,13 +3,13 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use conformance::bench::Bench;
 use conformance::cases::of_bench;
 use conformance::endpoint::exact_line::{ExactLine, Transport};
 use conformance::endpoint::sim::{Fitting, InProcess, board};
 use conformance::frame::Mode;
 use conformance::hil::bench_file::BenchFile;
 use conformance::run::{Outcome, Verdict, run_until};
+use conformance::tester::Tester;
 use modbus_line::exact::{Reply, Request};
 use register_map::{Module, configuration};
 use sim::Channel;
@@ -76,14 +76,14 @@ fn tested(boards: Boards, file: &str, stop_after: usize) -> Vec<Outcome> {
     let mut line = ExactLine::new(boards).expect("hello");
     let mut target = probed(&mut line, 1, Mode::Rtu);
     target.hil.wires = BenchFile::parse(file, None).expect("a bench file").wires;
-    let mut bench = Bench::new(&mut line, &target);
+    let mut tester = Tester::new(&mut line, &target);
     let set = match (target.bits, target.words) {
-        (Some(span), _) => bench.set_bits(span.first, &[true, false]),
-        (None, Some(words)) => bench.set_words(words.span.first, &[1234, 0]),
+        (Some(span), _) => tester.set_bits(span.first, &[true, false]),
+        (None, Some(words)) => tester.set_words(words.span.first, &[1234, 0]),
         (None, None) => panic!("unit 1 has outputs"),
     };
     set.expect("they can be set");
-    let before = bench.snapshot();
+    let before = tester.snapshot();
     let stop = AtomicBool::new(false);
     let mut left = stop_after;
     let mut outcomes = Vec::new();
@@ -92,7 +92,7 @@ fn tested(boards: Boards, file: &str, stop_after: usize) -> Vec<Outcome> {
         stop.store(left == 0, Ordering::Relaxed);
     };
     run_until(&mut line, &target, &of_bench(), &stop, count, &mut outcomes).expect("it works");
-    let after = Bench::new(&mut line, &target).snapshot();
+    let after = Tester::new(&mut line, &target).snapshot();
     assert_eq!(after, before, "the outputs are restored");
     outcomes
 }

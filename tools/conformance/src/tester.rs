@@ -18,7 +18,7 @@ use crate::target::{Patience, Target};
 /// The steps that return a [`Check`] fail with [`Stop::Broken`] when the endpoint no longer works, with [`Stop::Fail`]
 /// when the unit does not do what the step demands, and with [`Stop::Skip`] when the unit does not have what the step
 /// needs.
-pub struct Bench<'a> {
+pub struct Tester<'a> {
     /// The line.
     pub endpoint: &'a mut dyn Endpoint,
     /// The unit.
@@ -38,10 +38,10 @@ pub struct Bench<'a> {
     pub stop: &'a AtomicBool,
 }
 
-/// What [`Bench::stop`] is when nobody can end the run.
+/// What [`Tester::stop`] is when nobody can end the run.
 static NEVER: AtomicBool = AtomicBool::new(false);
 
-impl<'a> Bench<'a> {
+impl<'a> Tester<'a> {
     /// Returns the tools for this line and unit.
     pub fn new(endpoint: &'a mut dyn Endpoint, target: &'a Target) -> Self {
         Self {
@@ -120,7 +120,7 @@ impl<'a> Bench<'a> {
         }))
     }
 
-    /// Fails like [`Bench::fail`] unless the condition is true.
+    /// Fails like [`Tester::fail`] unless the condition is true.
     pub fn ensure(&self, holds: bool, wanted: impl Display) -> Check {
         if holds { Ok(()) } else { self.fail(wanted) }
     }
@@ -282,7 +282,7 @@ impl<'a> Bench<'a> {
         self.silence_to(&frame, why)
     }
 
-    /// Sends the request of [`Bench::alive`] to another unit, or to all units, and expects silence.
+    /// Sends the request of [`Tester::alive`] to another unit, or to all units, and expects silence.
     pub fn silent_ping(&mut self, unit: u8, why: impl Display) -> Check {
         self.silence_of(unit, &self.target.ping, why)
     }
@@ -300,18 +300,18 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// Sends pieces that end with the request of [`Bench::alive`]. The unit has to reply to that request.
+    /// Sends pieces that end with the request of [`Tester::alive`]. The unit has to reply to that request.
     pub fn answers(&mut self, pieces: &[Piece], wanted: impl Display) -> Check {
         let reply = self.exchange_due(pieces)?;
         self.ensure(self.is_pong(&reply), wanted)
     }
 
-    /// Returns the frame of the request of [`Bench::alive`].
+    /// Returns the frame of the request of [`Tester::alive`].
     pub fn ping(&self) -> Vec<u8> {
         self.frame(&self.target.ping)
     }
 
-    /// Returns whether a reply is right for the request of [`Bench::alive`].
+    /// Returns whether a reply is right for the request of [`Tester::alive`].
     pub fn is_pong(&self, reply: &Reply) -> bool {
         matches!(reply, Reply::Pdu(pdu) if pdu[0] == self.target.ping[0])
     }
