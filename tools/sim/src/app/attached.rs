@@ -5,9 +5,9 @@ use std::sync::mpsc::Sender;
 use sim::options::Options;
 
 use super::Event;
-use super::bench::Bench;
 use super::capture::Capture;
 use super::gateway::Gateway;
+use super::scene::Scene;
 
 /// The gateway and the capture file, each if an option asks for it.
 pub struct Attached {
@@ -34,15 +34,15 @@ impl Attached {
     }
 
     /// Passes new frames on to both. `halted` says that a debugger has halted the core, so that time stands still.
-    pub fn update(&mut self, bench: &mut Bench, halted: bool) {
+    pub fn update(&mut self, scene: &mut Scene, halted: bool) {
         if let Some(capture) = &mut self.capture {
-            capture.update(bench.bus.line());
+            capture.update(scene.bus.line());
             if capture.failed() {
                 self.capture = None;
             }
         }
         if let Some(gateway) = &mut self.gateway {
-            gateway.update(bench, halted);
+            gateway.update(scene, halted);
         }
     }
 }

@@ -96,12 +96,12 @@ mod tests {
     use sim::Time;
 
     use super::*;
-    use crate::app::{Origin, testing::bench};
+    use crate::app::{Origin, testing::scene};
 
     #[cfg(unix)]
     #[test]
     fn closing_the_reading_end_of_a_pipe_ends_the_recording() {
-        let mut bench = bench(Module::Di4);
+        let mut scene = scene(Module::Di4);
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("pipe");
         let made = std::process::Command::new("mkfifo").arg(&path).status();
@@ -112,9 +112,9 @@ mod tests {
         });
         let mut capture = Capture::create(&path).unwrap();
         let mut fails = || {
-            bench.send(&[1, 2, 3], Origin::Pty);
-            bench.bus.run_for(Time::from_ms(20));
-            capture.update(bench.bus.line());
+            scene.send(&[1, 2, 3], Origin::Pty);
+            scene.bus.run_for(Time::from_ms(20));
+            capture.update(scene.bus.line());
             capture.failed()
         };
         let reader = reader.join().unwrap();

@@ -12,8 +12,8 @@ use sim::Time;
 use sim::exact_line::{Session, begin};
 
 use super::Event;
-use super::bench::Bench;
 use super::clients::{self, Client};
+use super::scene::Scene;
 
 /// Longest first line of a connection in bytes, with its end: `hello` and a number.
 const LONGEST_HELLO: usize = 32;
@@ -136,8 +136,8 @@ pub struct Requests {
 
 impl Requests {
     /// Begins to carry out a request.
-    pub fn begin(&mut self, bench: &mut Bench, request: Request, answers: Answers) {
-        match begin(bench.first(), &request) {
+    pub fn begin(&mut self, scene: &mut Scene, request: Request, answers: Answers) {
+        match begin(scene.first(), &request) {
             Ok(until) => self.under_way = Some((request, until, answers)),
             // A client that has disconnected needs no answer. The same holds below.
             Err(reason) => drop(answers.send(Err(reason))),
@@ -150,16 +150,16 @@ impl Requests {
     }
 
     /// Lets at most `slice` of virtual time pass for the request under way, and replies when its time is over.
-    pub fn run(&mut self, bench: &mut Bench, slice: Time) {
+    pub fn run(&mut self, scene: &mut Scene, slice: Time) {
         let Some((request, until, answers)) = self.under_way.take() else {
             return;
         };
-        let now = bench.now();
-        bench.run_until(until.min(now + slice));
-        if bench.now() < until {
+        let now = scene.now();
+        scene.run_until(until.min(now + slice));
+        if scene.now() < until {
             self.under_way = Some((request, until, answers));
         } else {
-            let reply = self.session.finish(bench.first(), &request);
+            let reply = self.session.finish(scene.first(), &request);
             drop(answers.send(Ok(reply)));
         }
     }

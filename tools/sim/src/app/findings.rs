@@ -3,7 +3,7 @@
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::bench::Bench;
+use super::scene::Scene;
 
 /// The findings of the chip model.
 #[derive(Serialize, ToSchema)]
@@ -23,8 +23,8 @@ struct Finding {
 }
 
 /// Returns the findings of the chip model of board `n`.
-pub fn of_board(bench: &Bench, n: usize) -> Findings {
-    let findings = bench.bus.board(n).findings().iter();
+pub fn of_board(scene: &Scene, n: usize) -> Findings {
+    let findings = scene.bus.board(n).findings().iter();
     let findings = findings.map(|finding| Finding {
         at_us: finding.at.as_us(),
         pc: format!("{:#010x}", finding.pc),

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 use tokio::sync::broadcast;
 
-use super::bench::Bench;
+use super::scene::Scene;
 use super::{api, frames, state};
 
 /// Shortest time between two states.
@@ -67,13 +67,13 @@ impl Live {
 
     /// Sends the changes since the last call. `now` is the time of the wall clock. Without listeners this makes no
     /// JSON.
-    pub fn send(&mut self, bench: &mut Bench, now: Instant) {
+    pub fn send(&mut self, scene: &mut Scene, now: Instant) {
         if self.listeners.receiver_count() == 0 {
-            let last = bench.bus.line().frames().next_back();
+            let last = scene.bus.line().frames().next_back();
             self.frame = last.map_or(self.frame, |frame| frame.number);
             return;
         }
-        for frame in bench.bus.line().frames_since(self.frame) {
+        for frame in scene.bus.line().frames_since(self.frame) {
             self.frame = frame.number;
             let _ =
                 self.listeners
@@ -84,9 +84,9 @@ impl Live {
             return;
         }
         self.compared = Some(now);
-        self.states.resize(bench.units.len(), Value::Null);
+        self.states.resize(scene.units.len(), Value::Null);
         for (n, last) in self.states.iter_mut().enumerate() {
-            let whole = api::json(&state::of_board(bench, n));
+            let whole = api::json(&state::of_board(scene, n));
             let mut timeless = whole.clone();
             timeless["virtual_ms"] = Value::Null;
             if timeless != *last {
@@ -103,7 +103,7 @@ mod tests {
     use sim::Time;
 
     use super::*;
-    use crate::app::{Origin, testing::bench};
+    use crate::app::{Origin, testing::scene};
 
     fn taken(notes: &mut broadcast::Receiver<Note>) -> Vec<(&'static str, Value)> {
         std::iter::from_fn(|| notes.try_recv().ok())
@@ -113,15 +113,15 @@ mod tests {
 
     #[test]
     fn frames_are_sent_once_and_the_state_only_when_it_has_changed() {
-        let mut bench = bench(Module::Di4);
+        let mut scene = scene(Module::Di4);
         let mut live = Live::default();
         let begin = Instant::now();
         let request = [0x01, 0x01, 0x00, 0x10, 0x00, 0x04, 0x3C, 0x0C];
-        bench.send(&request, Origin::Pty);
-        bench.bus.run_for(Time::from_ms(20));
-        live.send(&mut bench, begin);
+        scene.send(&request, Origin::Pty);
+        scene.bus.run_for(Time::from_ms(20));
+        live.send(&mut scene, begin);
         let mut notes = live.listeners().subscribe();
-        live.send(&mut bench, begin);
+        live.send(&mut scene, begin);
         let first = taken(&mut notes);
         assert_eq!(
             first.len(),
@@ -131,16 +131,16 @@ mod tests {
         assert_eq!(first[0].0, "state");
         assert_eq!(first[0].1["line"]["rx_frames"], 1);
 
-        bench.bus.run_for(Time::from_ms(500));
-        live.send(&mut bench, begin + Duration::from_millis(500));
+        scene.bus.run_for(Time::from_ms(500));
+        live.send(&mut scene, begin + Duration::from_millis(500));
         assert!(taken(&mut notes).is_empty(), "only time has passed");
 
-        bench.send(&request, Origin::Pty);
-        bench.bus.run_for(Time::from_ms(20));
-        bench.first().set_energised(2, true).unwrap();
+        scene.send(&request, Origin::Pty);
+        scene.bus.run_for(Time::from_ms(20));
+        scene.first().set_energised(2, true).unwrap();
         let later = begin + Duration::from_secs(1);
         for _ in 0..3 {
-            live.send(&mut bench, later);
+            live.send(&mut scene, later);
         }
         let then = taken(&mut notes);
         let names: Vec<_> = then.iter().map(|(name, _)| *name).collect();
@@ -151,32 +151,32 @@ mod tests {
 
     #[test]
     fn states_are_compared_at_most_ten_times_a_second_also_when_nothing_changes() {
-        let mut bench = bench(Module::Di4);
+        let mut scene = scene(Module::Di4);
         let mut live = Live::default();
         let mut notes = live.listeners().subscribe();
         let begin = Instant::now();
-        live.send(&mut bench, begin);
-        live.send(&mut bench, begin + Duration::from_millis(1000));
+        live.send(&mut scene, begin);
+        live.send(&mut scene, begin + Duration::from_millis(1000));
         assert_eq!(taken(&mut notes).len(), 1, "nothing has changed");
-        bench.first().set_energised(1, true).unwrap();
-        live.send(&mut bench, begin + Duration::from_millis(1050));
+        scene.first().set_energised(1, true).unwrap();
+        live.send(&mut scene, begin + Duration::from_millis(1050));
         assert!(taken(&mut notes).is_empty(), "no state was made");
-        live.send(&mut bench, begin + Duration::from_millis(1100));
+        live.send(&mut scene, begin + Duration::from_millis(1100));
         assert_eq!(taken(&mut notes).len(), 1);
     }
 
     #[test]
     fn state_is_sent_at_most_ten_times_a_second_and_ends_with_the_last_one() {
-        let mut bench = bench(Module::Ai4);
+        let mut scene = scene(Module::Ai4);
         let mut live = Live::default();
         let mut notes = live.listeners().subscribe();
         let begin = Instant::now();
         for ms in 0..1000 {
             let millivolts = u16::try_from(ms).unwrap();
-            bench.first().set_millivolts(1, millivolts).unwrap();
-            live.send(&mut bench, begin + Duration::from_millis(ms));
+            scene.first().set_millivolts(1, millivolts).unwrap();
+            live.send(&mut scene, begin + Duration::from_millis(ms));
         }
-        live.send(&mut bench, begin + Duration::from_millis(1100));
+        live.send(&mut scene, begin + Duration::from_millis(1100));
         let sent = taken(&mut notes);
         assert!((9..=12).contains(&sent.len()), "{}", sent.len());
         let last = &sent.last().unwrap().1;

@@ -24,7 +24,6 @@ use sim::options::Options;
 mod action;
 mod api;
 mod attached;
-mod bench;
 mod boards;
 mod capture;
 mod clients;
@@ -46,6 +45,7 @@ mod radio;
 mod rs232;
 mod run;
 mod scenario;
+mod scene;
 mod state;
 mod tcp;
 mod terminals;
@@ -53,9 +53,9 @@ mod terminals;
 mod testing;
 mod unit;
 
-use bench::Bench;
 use flash_file::FlashFile;
 pub use inside::version;
+use scene::Scene;
 
 /// Virtual time from power-on until the endpoints are made and printed. Every unit answers by then: a unit that
 /// prepares its store, waits for its switch and has no crystal needs 360 ms (docs/safety.md), and its loader 100 ms.
@@ -119,12 +119,12 @@ fn pass_on(
 /// take over their cores, on which the code is translated: without that the first replies are late by the wall clock,
 /// and a scan misses the units.
 fn rehearse(options: &Options) -> Result<(), String> {
-    let mut bench = Bench::new(boards::fitted(options)?);
-    bench.run_until(START_UP);
-    for n in 0..bench.units.len() {
-        let address = bench.bus.board(n).dip();
-        bench.put(Framing::Rtu.frame(0, address, &[0x11]), Origin::Gateway);
-        bench.run_until(bench.now() + REHEARSED);
+    let mut scene = Scene::new(boards::fitted(options)?);
+    scene.run_until(START_UP);
+    for n in 0..scene.units.len() {
+        let address = scene.bus.board(n).dip();
+        scene.put(Framing::Rtu.frame(0, address, &[0x11]), Origin::Gateway);
+        scene.run_until(scene.now() + REHEARSED);
     }
     Ok(())
 }
@@ -139,21 +139,21 @@ pub fn run(options: &Options) -> Result<(), String> {
     if options.exact_line.is_none() {
         rehearse(options)?;
     }
-    let mut bench = Bench::new(boards::fitted(options)?);
+    let mut scene = Scene::new(boards::fitted(options)?);
     if let Some(line) = options.line {
-        bench.fix_line(line);
+        scene.fix_line(line);
     }
     if options.fixed_line {
-        bench.fix_gateway();
+        scene.fix_gateway();
     }
     if let Some(path) = &options.scenario {
-        bench.scenario = scenario::Scenario::read(path, &bench.known())?;
+        scene.scenario = scenario::Scenario::read(path, &scene.known())?;
     }
-    let files = bench.units.iter().filter_map(|unit| unit.flash.as_ref());
+    let files = scene.units.iter().filter_map(|unit| unit.flash.as_ref());
     let notes = files.filter_map(FlashFile::noted);
-    notes.for_each(|note| bench::complain(&note));
+    notes.for_each(|note| scene::complain(&note));
     // An unwritable file is reported now, not when the firmware saves something.
-    bench.write_flash()?;
+    scene.write_flash()?;
     let (events, queue) = mpsc::channel();
 
     let stop = events.clone();
@@ -162,8 +162,8 @@ pub fn run(options: &Options) -> Result<(), String> {
         .map_err(|error| format!("cannot catch Ctrl-C: {error}"))?;
 
     // A client that finds an endpoint, such as the link to the pseudo-terminal, can use it immediately.
-    bench.run_until(START_UP);
-    bench.start_radio(RADIO_START_UP);
+    scene.run_until(START_UP);
+    scene.start_radio(RADIO_START_UP);
     let mut endpoints = match options.exact_line {
         Some(address) => run::Endpoints::Exact(exact_line::listen(address, events.clone())?),
         None => run::Endpoints::Clock {
@@ -196,41 +196,41 @@ pub fn run(options: &Options) -> Result<(), String> {
     match &mut endpoints {
         run::Endpoints::Exact(address) => {
             // The line has taken over the unit's rate and format by now. From here on only the client changes them.
-            bench.bus.line().set_follow(false);
-            bench.announce("exact-line", address);
+            scene.bus.line().set_follow(false);
+            scene.announce("exact-line", address);
         }
         run::Endpoints::Clock { pty, tcp, .. } => {
             if options.fixed_line {
-                let settings = bench.bus.line().settings();
-                bench.fix_line(settings);
+                let settings = scene.bus.line().settings();
+                scene.fix_line(settings);
                 pty.keep_own_rate(settings.baud)?;
             }
             if let Some(path) = pty.path() {
-                bench.announce("pty", path.display());
+                scene.announce("pty", path.display());
             }
             if let Some(tcp) = tcp {
-                bench.announce("tcp", tcp.address());
+                scene.announce("tcp", tcp.address());
             }
             if let Some(gateway) = &attached.gateway {
-                bench.announce("modbus-tcp", gateway.address());
+                scene.announce("modbus-tcp", gateway.address());
             }
         }
     }
-    bench.announce("http", format_args!("http://{http}/"));
+    scene.announce("http", format_args!("http://{http}/"));
     if let Some(gdb) = gdb {
-        bench.announce("gdb", gdb);
+        scene.announce("gdb", gdb);
     }
     for (name, path) in endpoints.others() {
-        bench.announce(name, path.display());
+        scene.announce(name, path.display());
     }
 
     run::until_stopped(
-        &mut bench,
+        &mut scene,
         &queue,
         &mut endpoints,
         &mut live,
         &mut attached,
         options.run_for,
     );
-    bench.write_flash()
+    scene.write_flash()
 }

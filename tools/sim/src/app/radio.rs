@@ -3,12 +3,12 @@
 use sim::Time;
 use sim::radio::Mode;
 
-use super::bench::Bench;
+use super::scene::Scene;
 
 /// Interval at which the mode of a module is checked.
 const LOOK: Time = Time::from_ms(10);
 
-impl Bench {
+impl Scene {
     /// Lets the gateway keep its factory parameters, instead of following the first board's module.
     pub fn fix_gateway(&mut self) {
         if let Some(air) = self.bus.air() {
@@ -67,36 +67,36 @@ mod tests {
         for boards in [vec!["one"], vec!["one", "two"]] {
             let config = || fitted(Parameters::FACTORY);
             let boards = boards.into_iter().map(|name| (name, config()));
-            let mut bench = bench_of_boards(boards);
-            bench.run_until(Time::from_ms(10));
-            bench.send_by_radio(b"ab");
-            bench.send_by_radio(b"c");
-            let now = bench.now();
-            let air = bench.bus.air().unwrap();
+            let mut scene = bench_of_boards(boards);
+            scene.run_until(Time::from_ms(10));
+            scene.send_by_radio(b"ab");
+            scene.send_by_radio(b"c");
+            let now = scene.now();
+            let air = scene.bus.air().unwrap();
             air.transmit(now + Time::from_ms(300), Parameters::FACTORY, b"reply");
-            bench.run_until(Time::from_ms(700));
-            let air = bench.bus.air().unwrap();
+            scene.run_until(Time::from_ms(700));
+            let air = scene.bus.air().unwrap();
             let sent: Vec<_> = air.packets().map(|packet| packet.bytes.clone()).collect();
             assert_eq!(sent, [b"reply".to_vec(), b"abc".to_vec()]);
-            assert_eq!(bench.take_received_by_radio(), b"reply");
-            assert!(bench.take_received_by_radio().is_empty());
+            assert_eq!(scene.take_received_by_radio(), b"reply");
+            assert!(scene.take_received_by_radio().is_empty());
         }
     }
 
     #[test]
     fn board_without_a_module_has_no_gateway_and_starts_at_once() {
-        let mut bench = bench_of(Config::default());
-        bench.send_by_radio(b"lost");
-        bench.fix_gateway();
-        bench.start_radio(Time::from_secs(3));
-        assert_eq!(bench.now(), Time::ZERO);
-        assert!(bench.take_received_by_radio().is_empty());
+        let mut scene = bench_of(Config::default());
+        scene.send_by_radio(b"lost");
+        scene.fix_gateway();
+        scene.start_radio(Time::from_secs(3));
+        assert_eq!(scene.now(), Time::ZERO);
+        assert!(scene.take_received_by_radio().is_empty());
     }
 
     #[test]
     fn module_that_does_not_enter_normal_mode_is_waited_for_up_to_the_limit() {
-        let mut bench = bench_of(fitted(Parameters::FACTORY));
-        bench.start_radio(Time::from_ms(200));
-        assert!(bench.now() >= Time::from_ms(200) && bench.now() < Time::from_ms(201));
+        let mut scene = bench_of(fitted(Parameters::FACTORY));
+        scene.start_radio(Time::from_ms(200));
+        assert!(scene.now() >= Time::from_ms(200) && scene.now() < Time::from_ms(201));
     }
 }

@@ -2,9 +2,9 @@
 
 use sim::Time;
 
-use super::bench::Bench;
+use super::scene::Scene;
 
-impl Bench {
+impl Scene {
     /// Sends bytes to the socket now, or directly after the bytes that are still being sent. Returns the end of the last
     /// byte.
     pub fn send_by_rs232(&mut self, bytes: &[u8]) -> Time {

@@ -9,11 +9,11 @@ use std::time::{Duration, Instant};
 use sim::Time;
 
 use super::attached::Attached;
-use super::bench::Bench;
 use super::exact_line::Requests;
 use super::gdb::Session;
 use super::live::Live;
 use super::pace::{Pace, Speed, span};
+use super::scene::Scene;
 use super::{Event, Hold, Origin, api, pty, tcp};
 
 /// Longest time between two updates of the boards: no byte waits longer to be passed on.
@@ -62,7 +62,7 @@ impl Endpoints {
 
 /// Runs until [`Event::Stop`], or for `limit` by the wall clock, and keeps the flash files up to date.
 pub fn until_stopped(
-    bench: &mut Bench,
+    scene: &mut Scene,
     queue: &Receiver<Event>,
     endpoints: &mut Endpoints,
     live: &mut Live,
@@ -72,10 +72,10 @@ pub fn until_stopped(
     let begin = Instant::now();
     let mut clock = Clock {
         pace: match endpoints {
-            Endpoints::Clock { .. } => Some(Pace::new(begin, bench.now())),
+            Endpoints::Clock { .. } => Some(Pace::new(begin, scene.now())),
             Endpoints::Exact(_) => None,
         },
-        speed: Speed::new(begin, bench.now()),
+        speed: Speed::new(begin, scene.now()),
         debugger: Session::default(),
     };
     let mut requests = Requests::default();
@@ -83,13 +83,13 @@ pub fn until_stopped(
     let mut holds: Vec<(Time, Hold)> = Vec::new();
     loop {
         let wall = Instant::now();
-        clock.catch_up(bench);
-        requests.run(bench, span(AT_ONCE));
-        holds.retain(|(end, _)| *end > bench.now() + AHEAD);
-        bench.print_news();
-        live.send(bench, wall);
-        attached.update(bench, clock.debugger.halted());
-        bench.keep_flash();
+        clock.catch_up(scene);
+        requests.run(scene, span(AT_ONCE));
+        holds.retain(|(end, _)| *end > scene.now() + AHEAD);
+        scene.print_news();
+        live.send(scene, wall);
+        attached.update(scene, clock.debugger.halted());
+        scene.keep_flash();
         let mut wait = if requests.busy() {
             Duration::ZERO
         } else {
@@ -103,27 +103,27 @@ pub fn until_stopped(
         } = endpoints
         {
             if let Some(baud) = pty.take_rate() {
-                bench.set_client_rate(baud);
+                scene.set_client_rate(baud);
             }
-            for (origin, bytes) in bench.take_sent() {
+            for (origin, bytes) in scene.take_sent() {
                 if !matches!(origin, Origin::Pty) {
                     pty.write(&bytes);
                 }
                 tcp.iter().for_each(|tcp| tcp.write(&bytes, Some(&origin)));
             }
-            let bytes = bench.take_received();
+            let bytes = scene.take_received();
             if !bytes.is_empty() {
                 pty.write(&bytes);
                 tcp.iter().for_each(|tcp| tcp.write(&bytes, None));
             }
             if let Some(lora) = lora {
-                let bytes = bench.take_received_by_radio();
+                let bytes = scene.take_received_by_radio();
                 if !bytes.is_empty() {
                     lora.write(&bytes);
                 }
             }
             if let Some(rs232) = rs232 {
-                let bytes = bench.take_received_by_rs232();
+                let bytes = scene.take_received_by_rs232();
                 if !bytes.is_empty() {
                     rs232.write(&bytes);
                 }
@@ -139,40 +139,40 @@ pub fn until_stopped(
         }
         match queue.recv_timeout(wait) {
             Ok(Event::Bytes(bytes, hold)) => {
-                clock.catch_up(bench);
-                holds.push((bench.send(&bytes, Origin::Pty), hold));
+                clock.catch_up(scene);
+                holds.push((scene.send(&bytes, Origin::Pty), hold));
             }
             Ok(Event::Tcp(client, bytes, hold)) => {
-                clock.catch_up(bench);
-                holds.push((bench.send(&bytes, Origin::Tcp(client)), hold));
+                clock.catch_up(scene);
+                holds.push((scene.send(&bytes, Origin::Tcp(client)), hold));
             }
             Ok(Event::Radio(bytes, hold)) => {
-                clock.catch_up(bench);
-                holds.push((bench.send_by_radio(&bytes), hold));
+                clock.catch_up(scene);
+                holds.push((scene.send_by_radio(&bytes), hold));
             }
             Ok(Event::Rs232(bytes, hold)) => {
-                clock.catch_up(bench);
-                holds.push((bench.send_by_rs232(&bytes), hold));
+                clock.catch_up(scene);
+                holds.push((scene.send_by_rs232(&bytes), hold));
             }
             Ok(Event::Gateway(message)) => {
                 if let Some(gateway) = &mut attached.gateway {
                     gateway.take(message);
                 }
             }
-            Ok(Event::Exact(request, answers)) => requests.begin(bench, request, answers),
+            Ok(Event::Exact(request, answers)) => requests.begin(scene, request, answers),
             Ok(Event::Request(request, reply)) => {
-                clock.catch_up(bench);
-                let before = bench.now();
+                clock.catch_up(scene);
+                let before = scene.now();
                 // A client that has disconnected needs no reply.
-                let _ = reply.send(api::answer(bench, &request));
-                if bench.now() > before {
+                let _ = reply.send(api::answer(scene, &request));
+                if scene.now() > before {
                     // A power cycle has let virtual time pass, so it is ahead of the wall clock. Start from here.
-                    clock.restart(bench.now());
+                    clock.restart(scene.now());
                 }
             }
             Ok(Event::Gdb(message)) => {
-                clock.catch_up(bench);
-                clock.debugger.take(message, bench);
+                clock.catch_up(scene);
+                clock.debugger.take(message, scene);
             }
             Ok(Event::Stop) => return,
             // No sender is left, so no event can arrive: only let time pass.
@@ -202,8 +202,8 @@ impl Clock {
 
     /// Lets virtual time catch up with the wall clock, by at most [`AT_ONCE`]. It stands still while a debugger has
     /// halted the core.
-    fn catch_up(&mut self, bench: &mut Bench) {
-        let at = bench.now();
+    fn catch_up(&mut self, scene: &mut Scene) {
+        let at = scene.now();
         if self.debugger.halted() {
             return self.restart(at);
         }
@@ -216,7 +216,7 @@ impl Clock {
                 );
             }
             self.debugger
-                .run_until(target.min(at + span(AT_ONCE)), bench);
+                .run_until(target.min(at + span(AT_ONCE)), scene);
         }
     }
 }

@@ -9,8 +9,8 @@ use utoipa::openapi::schema::{SchemaType, Type};
 use utoipa::openapi::{ObjectBuilder, RefOr, Schema};
 use utoipa::{PartialSchema, ToSchema};
 
-use super::bench::Bench;
 use super::faults::{Faults, HSI_HZ};
+use super::scene::Scene;
 use super::terminals::{self, Terminal};
 
 /// The state of a board.
@@ -220,12 +220,12 @@ fn one_of<const N: usize>(names: [&'static str; N]) -> RefOr<Schema> {
 }
 
 /// Returns the state of board `n`.
-pub fn of_board(bench: &mut Bench, n: usize) -> State {
-    let line = bench.bus.line();
+pub fn of_board(scene: &mut Scene, n: usize) -> State {
+    let line = scene.bus.line();
     let settings = line.settings();
     let (rx_frames, tx_frames) = line.frame_counts();
-    let running_slot = bench.bus.board_mut(n).running_slot();
-    let board = bench.bus.board(n);
+    let running_slot = scene.bus.board_mut(n).running_slot();
+    let board = scene.bus.board(n);
     let leds = board.leds();
     let mut slots: Vec<_> = board
         .slots()
@@ -262,7 +262,7 @@ pub fn of_board(bench: &mut Bench, n: usize) -> State {
             tx_frames,
         },
         channels: [1, 2, 3, 4].map(|number| board.channel(number).into()),
-        log_tail: bench.units[n].log_tail().map(str::to_owned).collect(),
+        log_tail: scene.units[n].log_tail().map(str::to_owned).collect(),
         slots,
         terminals: terminals::of_board(board),
         radio: board.radio().map(radio),
@@ -270,10 +270,10 @@ pub fn of_board(bench: &mut Bench, n: usize) -> State {
 }
 
 /// Returns the faults in force on the line, in the air, and on board `n`.
-pub fn faults(bench: &mut Bench, n: usize) -> Faults {
-    let radio_loss = bench.bus.air().map(|air| air.loss());
-    let line = &bench.disturbance;
-    let board = bench.bus.board(n);
+pub fn faults(scene: &mut Scene, n: usize) -> Faults {
+    let radio_loss = scene.bus.air().map(|air| air.loss());
+    let line = &scene.disturbance;
+    let board = scene.bus.board(n);
     let (hsi, lsi) = board.rc_oscillators();
     // Round, because the oscillators are set in whole hertz.
     let rounded = |value: f64| (value * 1000.0).round() / 1000.0;
@@ -282,7 +282,7 @@ pub fn faults(bench: &mut Bench, n: usize) -> Faults {
         drop_rate: Some(line.drop_rate()),
         noise_hz: Some(line.noise_hz()),
         radio_loss,
-        i2c_absent: Some(bench.units[n].i2c_absent),
+        i2c_absent: Some(scene.units[n].i2c_absent),
         hse_failed: Some(!board.crystal()),
         hsi_percent: Some(rounded((f64::from(hsi) / HSI_HZ - 1.0) * 100.0)),
         lsi_khz: Some(rounded(f64::from(lsi) / 1000.0)),
@@ -290,8 +290,8 @@ pub fn faults(bench: &mut Bench, n: usize) -> Faults {
 }
 
 /// Returns the boards on the line.
-pub fn boards(bench: &Bench) -> Vec<OneBoard> {
-    let boards = bench.units.iter().zip(bench.bus.boards());
+pub fn boards(scene: &Scene) -> Vec<OneBoard> {
+    let boards = scene.units.iter().zip(scene.bus.boards());
     boards
         .map(|(unit, board)| OneBoard {
             name: unit.name.clone(),

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use register_map::Module;
 use sim::{Board, Config, Image};
 
-use super::bench::Bench;
+use super::scene::Scene;
 use super::unit::Unit;
 
 /// Part of the message about a missing directory.
@@ -42,23 +42,23 @@ fn board_of(config: Config) -> Board {
     Board::new(&image, config).expect("the image fits into the flash")
 }
 
-/// Returns a bench with one board that has this module, and its power on.
-pub fn bench(module: Module) -> Bench {
+/// Returns a scene with one board that has this module, and its power on.
+pub fn scene(module: Module) -> Scene {
     bench_of(Config {
         module,
         ..Config::default()
     })
 }
 
-/// Returns a bench with one board of this configuration.
-pub fn bench_of(config: Config) -> Bench {
+/// Returns a scene with one board of this configuration.
+pub fn bench_of(config: Config) -> Scene {
     bench_of_boards([("modio-02", config)])
 }
 
-/// Returns a bench with several boards and their names.
-pub fn bench_of_boards(boards: impl IntoIterator<Item = (&'static str, Config)>) -> Bench {
+/// Returns a scene with several boards and their names.
+pub fn bench_of_boards(boards: impl IntoIterator<Item = (&'static str, Config)>) -> Scene {
     let boards = boards
         .into_iter()
         .map(|(name, config)| (board_of(config), Unit::new(name.to_owned(), None)));
-    Bench::new(boards.collect())
+    Scene::new(boards.collect())
 }

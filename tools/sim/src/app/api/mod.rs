@@ -20,10 +20,10 @@ use utoipa::ToSchema;
 
 use self::body::{Dip, Power};
 use super::action::Action;
-use super::bench::Bench;
 use super::faults::Faults;
 use super::findings::{self, Findings};
 use super::frames::{self, Frames};
+use super::scene::Scene;
 use super::state::{self, OneBoard, State};
 
 /// Longest reason of a refusal, in characters.
@@ -87,15 +87,15 @@ impl From<Error> for Reply {
 type Outcome = Result<Value, Reply>;
 
 /// Carries out a request.
-pub fn answer(bench: &mut Bench, request: &Request) -> Reply {
+pub fn answer(scene: &mut Scene, request: &Request) -> Reply {
     let (path, query) = request
         .target
         .split_once('?')
         .unwrap_or((&request.target, ""));
     let answered = match path.strip_prefix("/api/") {
         Some(rest) => {
-            let (board, rest) = of_board(bench, rest).unwrap_or((0, rest));
-            of_path(bench, board, request, rest, query)
+            let (board, rest) = of_board(scene, rest).unwrap_or((0, rest));
+            of_path(scene, board, request, rest, query)
         }
         None => None,
     };
@@ -107,40 +107,40 @@ pub fn answer(bench: &mut Bench, request: &Request) -> Reply {
 }
 
 /// Returns the board that the path names, and the path without its name.
-fn of_board<'a>(bench: &Bench, path: &'a str) -> Option<(usize, &'a str)> {
+fn of_board<'a>(scene: &Scene, path: &'a str) -> Option<(usize, &'a str)> {
     let (name, rest) = path.strip_prefix("boards/")?.split_once('/')?;
-    let mut units = bench.units.iter();
+    let mut units = scene.units.iter();
     Some((units.position(|unit| unit.name == name)?, rest))
 }
 
 /// Carries out a request for board `n`. Returns `None` if there is no such path.
 fn of_path(
-    bench: &mut Bench,
+    scene: &mut Scene,
     n: usize,
     request: &Request,
     path: &str,
     query: &str,
 ) -> Option<Outcome> {
     Some(match path {
-        "boards" => reading(request).map(|()| get_boards(bench)),
-        "endpoints" => reading(request).map(|()| get_endpoints(bench)),
-        "state" => reading(request).map(|()| get_state(bench, n)),
-        "frames" => reading(request).and_then(|()| get_frames(bench, query)),
-        "findings" => reading(request).map(|()| get_findings(bench, n)),
+        "boards" => reading(request).map(|()| get_boards(scene)),
+        "endpoints" => reading(request).map(|()| get_endpoints(scene)),
+        "state" => reading(request).map(|()| get_state(scene, n)),
+        "frames" => reading(request).and_then(|()| get_frames(scene, query)),
+        "findings" => reading(request).map(|()| get_findings(scene, n)),
         "openapi.json" => reading(request).map(|()| get_openapi()),
-        "faults" if request.method == "GET" => Ok(get_faults(bench, n)),
-        "faults" => post_faults(bench, n, request),
-        "dip" => post_dip(bench, n, request),
-        "pdu" => pdu::post(bench, n, request),
-        "power" => post_power(bench, n, request),
-        _ => return outside::of_path(bench, n, request, path),
+        "faults" if request.method == "GET" => Ok(get_faults(scene, n)),
+        "faults" => post_faults(scene, n, request),
+        "dip" => post_dip(scene, n, request),
+        "pdu" => pdu::post(scene, n, request),
+        "power" => post_power(scene, n, request),
+        _ => return outside::of_path(scene, n, request, path),
     })
 }
 
 /// The visible state of the board
 #[utoipa::path(get, path = "/api/state", responses((status = 200, description = "The state", body = State)))]
-fn get_state(bench: &mut Bench, n: usize) -> Value {
-    json(&state::of_board(bench, n))
+fn get_state(scene: &mut Scene, n: usize) -> Value {
+    json(&state::of_board(scene, n))
 }
 
 /// The last 1000 frames on the line
@@ -153,8 +153,8 @@ fn get_state(bench: &mut Bench, n: usize) -> Value {
         (status = 400, description = "`since` is not a number", body = Refusal),
     )
 )]
-fn get_frames(bench: &mut Bench, query: &str) -> Outcome {
-    Ok(json(&frames::since(bench.bus.line(), since(query)?)))
+fn get_frames(scene: &mut Scene, query: &str) -> Outcome {
+    Ok(json(&frames::since(scene.bus.line(), since(query)?)))
 }
 
 /// The boards on the line. Every other path also exists as `/api/boards/{name}/...`; without `boards/{name}` it means
@@ -164,8 +164,8 @@ fn get_frames(bench: &mut Bench, query: &str) -> Outcome {
     path = "/api/boards",
     responses((status = 200, description = "The boards. Paths without a name mean the first one", body = [OneBoard]))
 )]
-fn get_boards(bench: &Bench) -> Value {
-    json(&state::boards(bench))
+fn get_boards(scene: &Scene) -> Value {
+    json(&state::boards(scene))
 }
 
 /// The endpoints that the simulator has announced
@@ -179,8 +179,8 @@ fn get_boards(bench: &Bench) -> Value {
         example = json!({"pty": "/dev/pts/3", "tcp": "127.0.0.1:5020", "http": "http://127.0.0.1:8502/"}),
     ))
 )]
-fn get_endpoints(bench: &Bench) -> Value {
-    json(&bench.endpoints.iter().cloned().collect::<BTreeMap<_, _>>())
+fn get_endpoints(scene: &Scene) -> Value {
+    json(&scene.endpoints.iter().cloned().collect::<BTreeMap<_, _>>())
 }
 
 /// The findings of the chip model: actions of the firmware that a real part does not allow
@@ -189,8 +189,8 @@ fn get_endpoints(bench: &Bench) -> Value {
     path = "/api/findings",
     responses((status = 200, description = "The findings, oldest first", body = inline(Findings)))
 )]
-fn get_findings(bench: &Bench, n: usize) -> Value {
-    json(&findings::of_board(bench, n))
+fn get_findings(scene: &Scene, n: usize) -> Value {
+    json(&findings::of_board(scene, n))
 }
 
 /// This description
@@ -205,8 +205,8 @@ fn get_openapi() -> Value {
 
 /// The faults in force on the line and on the board
 #[utoipa::path(get, path = "/api/faults", responses((status = 200, description = "The faults in force", body = Faults)))]
-fn get_faults(bench: &mut Bench, n: usize) -> Value {
-    json(&state::faults(bench, n))
+fn get_faults(scene: &mut Scene, n: usize) -> Value {
+    json(&state::faults(scene, n))
 }
 
 /// Cause or clear faults; an entry that is not named keeps its value
@@ -216,37 +216,37 @@ fn get_faults(bench: &mut Bench, n: usize) -> Value {
     request_body = Faults,
     responses((status = 200, description = "The faults in force after the request", body = Faults))
 )]
-fn post_faults(bench: &mut Bench, n: usize, request: &Request) -> Outcome {
+fn post_faults(scene: &mut Scene, n: usize, request: &Request) -> Outcome {
     let action = Action::Faults(body::faults(request)?);
-    bench.apply(n, &action)?;
-    Ok(get_faults(bench, n))
+    scene.apply(n, &action)?;
+    Ok(get_faults(scene, n))
 }
 
 /// Move the DIP switch; the firmware reads it at the next power-on
 #[utoipa::path(post, path = "/api/dip", request_body = inline(Dip))]
-fn post_dip(bench: &mut Bench, n: usize, request: &Request) -> Outcome {
+fn post_dip(scene: &mut Scene, n: usize, request: &Request) -> Outcome {
     let Dip { value } = body::dip(request)?;
-    apply(bench, n, &Action::Dip(value))
+    apply(scene, n, &Action::Dip(value))
 }
 
 /// Switch the power immediately, whatever the core executes
 #[utoipa::path(post, path = "/api/power", request_body = inline(Power))]
-fn post_power(bench: &mut Bench, n: usize, request: &Request) -> Outcome {
+fn post_power(scene: &mut Scene, n: usize, request: &Request) -> Outcome {
     match body::power(request)? {
-        Power::On(true) => apply(bench, n, &Action::PowerOn),
-        Power::On(false) => apply(bench, n, &Action::PowerOff),
+        Power::On(true) => apply(scene, n, &Action::PowerOn),
+        Power::On(false) => apply(scene, n, &Action::PowerOff),
         Power::Cycle(true) => {
-            bench.cycle(n);
-            Ok(get_state(bench, n))
+            scene.cycle(n);
+            Ok(get_state(scene, n))
         }
         Power::Cycle(false) => Err(Reply::error(400, "`cycle` must be true")),
     }
 }
 
 /// Applies an action to board `n`, and returns the new state.
-fn apply(bench: &mut Bench, n: usize, action: &Action) -> Outcome {
-    bench.apply(n, action)?;
-    Ok(get_state(bench, n))
+fn apply(scene: &mut Scene, n: usize, action: &Action) -> Outcome {
+    scene.apply(n, action)?;
+    Ok(get_state(scene, n))
 }
 
 /// Returns a reply as JSON.

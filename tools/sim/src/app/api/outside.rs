@@ -3,20 +3,20 @@
 use super::body::{self, Plug};
 use super::{Outcome, Refusal, Reply, Request, apply};
 use crate::app::action::{Action, Change};
-use crate::app::bench::Bench;
+use crate::app::scene::Scene;
 use crate::app::terminals::Applied;
 
 /// Carries out a request for a slot or a terminal of board `n`. Returns `None` if there is no such path.
-pub fn of_path(bench: &mut Bench, n: usize, request: &Request, path: &str) -> Option<Outcome> {
+pub fn of_path(scene: &mut Scene, n: usize, request: &Request, path: &str) -> Option<Outcome> {
     match path.strip_prefix("terminals/") {
-        Some(name) => Some(post_terminal(bench, n, request, name)),
-        None => of_slot(bench, n, request, path),
+        Some(name) => Some(post_terminal(scene, n, request, name)),
+        None => of_slot(scene, n, request, path),
     }
 }
 
 /// Carries out a request for a slot: the one at the port in `path`, or the first one. Returns `None` if there is no
 /// such path.
-fn of_slot(bench: &mut Bench, n: usize, request: &Request, path: &str) -> Option<Outcome> {
+fn of_slot(scene: &mut Scene, n: usize, request: &Request, path: &str) -> Option<Outcome> {
     let (port, rest) = match path.strip_prefix("slots/") {
         Some(path) => {
             let (port, rest) = path.split_once('/')?;
@@ -26,15 +26,15 @@ fn of_slot(bench: &mut Bench, n: usize, request: &Request, path: &str) -> Option
     };
     if rest == "module" {
         return Some(match port {
-            Some(port) => post_slot_module(bench, n, request, port),
-            None => post_module(bench, n, request, None),
+            Some(port) => post_slot_module(scene, n, request, port),
+            None => post_module(scene, n, request, None),
         });
     }
     let channel = rest.strip_prefix("channels/")?;
     Some(match (port, channel_number(channel)) {
         (_, None) => Err(Reply::error(404, "channels are numbered 1 to 4")),
-        (Some(port), Some(channel)) => post_slot_channel(bench, n, request, port, channel),
-        (None, Some(channel)) => post_channel(bench, n, request, (None, channel)),
+        (Some(port), Some(channel)) => post_slot_channel(scene, n, request, port, channel),
+        (None, Some(channel)) => post_channel(scene, n, request, (None, channel)),
     })
 }
 
@@ -45,9 +45,9 @@ fn of_slot(bench: &mut Bench, n: usize, request: &Request, path: &str) -> Option
     request_body = inline(Plug),
     responses((status = 409, description = "The power is on", body = Refusal))
 )]
-pub fn post_module(bench: &mut Bench, n: usize, request: &Request, port: Option<u8>) -> Outcome {
+pub fn post_module(scene: &mut Scene, n: usize, request: &Request, port: Option<u8>) -> Outcome {
     let Plug { name: module } = body::plug(request)?;
-    apply(bench, n, &Action::Module { port, module })
+    apply(scene, n, &Action::Module { port, module })
 }
 
 /// Plug another module into this slot, while the power is off
@@ -61,8 +61,8 @@ pub fn post_module(bench: &mut Bench, n: usize, request: &Request, port: Option<
         (status = 409, description = "The power is on", body = Refusal),
     )
 )]
-pub fn post_slot_module(bench: &mut Bench, n: usize, request: &Request, port: u8) -> Outcome {
-    post_module(bench, n, request, Some(port))
+pub fn post_slot_module(scene: &mut Scene, n: usize, request: &Request, port: u8) -> Outcome {
+    post_module(scene, n, request, Some(port))
 }
 
 /// Change what is connected to a channel
@@ -77,7 +77,7 @@ pub fn post_slot_module(bench: &mut Bench, n: usize, request: &Request, port: u8
     )
 )]
 pub fn post_channel(
-    bench: &mut Bench,
+    scene: &mut Scene,
     n: usize,
     request: &Request,
     (port, channel): (Option<u8>, usize),
@@ -88,7 +88,7 @@ pub fn post_channel(
         channel,
         change,
     };
-    apply(bench, n, &action)
+    apply(scene, n, &action)
 }
 
 /// Change what is connected to a channel
@@ -106,13 +106,13 @@ pub fn post_channel(
     )
 )]
 pub fn post_slot_channel(
-    bench: &mut Bench,
+    scene: &mut Scene,
     n: usize,
     request: &Request,
     port: u8,
     channel: usize,
 ) -> Outcome {
-    post_channel(bench, n, request, (Some(port), channel))
+    post_channel(scene, n, request, (Some(port), channel))
 }
 
 /// Change what is connected to a terminal of a board with fixed inputs and outputs
@@ -126,10 +126,10 @@ pub fn post_slot_channel(
         (status = 409, description = "The terminal is of another kind", body = Refusal),
     )
 )]
-pub fn post_terminal(bench: &mut Bench, n: usize, request: &Request, name: &str) -> Outcome {
+pub fn post_terminal(scene: &mut Scene, n: usize, request: &Request, name: &str) -> Outcome {
     let applied = body::applied(request)?;
     let name = name.to_owned();
-    apply(bench, n, &Action::Terminal { name, applied })
+    apply(scene, n, &Action::Terminal { name, applied })
 }
 
 fn channel_number(text: &str) -> Option<usize> {

@@ -4,7 +4,7 @@ use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
 
-use super::{Bench, Outcome, Refusal, Reply, Request, body, json, state};
+use super::{Outcome, Refusal, Reply, Request, Scene, body, json, state};
 use crate::app::frames::hex;
 use crate::app::gateway;
 
@@ -28,15 +28,15 @@ pub struct Pdu {
         (status = 504, description = "The unit does not reply", body = Refusal),
     )
 )]
-pub fn post(bench: &mut Bench, n: usize, request: &Request) -> Outcome {
+pub fn post(scene: &mut Scene, n: usize, request: &Request) -> Outcome {
     let pdu = body::pdu(request)?;
-    let unit = state::address(bench.bus.board(n)).ok_or_else(|| {
+    let unit = state::address(scene.bus.board(n)).ok_or_else(|| {
         Reply::error(
             409,
             "the unit has no address: its power is off, or SW01 was no address",
         )
     })?;
-    let reply = gateway::ask(bench, n, unit, pdu);
+    let reply = gateway::ask(scene, n, unit, pdu);
     let pdu = reply.ok_or_else(|| Reply::error(504, "the unit does not reply"))?;
     Ok::<Value, Reply>(json(&Pdu { pdu: hex(&pdu) }))
 }

@@ -6,7 +6,7 @@ use sim::line::{Direction, Frame, Line, Settings, frame_silence};
 
 use super::mbap::Request;
 use crate::app::Origin;
-use crate::app::bench::Bench;
+use crate::app::scene::Scene;
 
 /// Time after the request within which a unit must begin its reply.
 const BEGINS: Time = Time::from_ms(200);
@@ -42,14 +42,14 @@ pub struct Exchange {
 
 impl Exchange {
     /// Sends a request: now, or directly after the bytes that other masters are still sending.
-    pub fn begin(bench: &mut Bench, framing: Framing, request: &Request) -> Self {
-        let after = bench.bus.line().frames().next_back();
+    pub fn begin(scene: &mut Scene, framing: Framing, request: &Request) -> Self {
+        let after = scene.bus.line().frames().next_back();
         let after = after.map_or(0, |frame| frame.number);
         let bytes = framing.frame(0, request.unit, &request.pdu);
-        let end = bench.put(bytes, Origin::Gateway);
+        let end = scene.put(bytes, Origin::Gateway);
         let wait = match request.unit {
             0 => TURNAROUND,
-            _ => patience(framing, bench.bus.line().settings()),
+            _ => patience(framing, scene.bus.line().settings()),
         };
         Self {
             framing,

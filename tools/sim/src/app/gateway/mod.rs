@@ -28,7 +28,7 @@ use self::exchange::{Exchange, Outcome};
 use self::mbap::Request;
 use self::mode::Mode;
 use super::Event;
-use super::bench::Bench;
+use super::scene::Scene;
 
 /// Exception 0A: nothing can be sent on the line now, or not to this unit.
 const NO_PATH: u8 = 0x0A;
@@ -85,11 +85,11 @@ impl Gateway {
 
     /// Passes on a reply that was received, and sends the next request. `halted` says that a debugger has halted the
     /// core: no time passes on the line then, so nothing can be sent.
-    pub fn update(&mut self, bench: &mut Bench, halted: bool) {
-        self.mode.update(bench.bus.board(0));
+    pub fn update(&mut self, scene: &mut Scene, halted: bool) {
+        self.mode.update(scene.bus.board(0));
         for _ in 0..AT_ONCE {
             if let Some((exchange, request, responses)) = self.under_way.take() {
-                match exchange.outcome(bench.bus.line()) {
+                match exchange.outcome(scene.bus.line()) {
                     Outcome::Waiting => {
                         self.under_way = Some((exchange, request, responses));
                         return;
@@ -106,8 +106,8 @@ impl Gateway {
             if halted || (248..=254).contains(&request.unit) {
                 refuse(&responses, &request, NO_PATH);
             } else {
-                let framing = self.mode.framing(bench.bus.line().settings());
-                let exchange = Exchange::begin(bench, framing, &request);
+                let framing = self.mode.framing(scene.bus.line().settings());
+                let exchange = Exchange::begin(scene, framing, &request);
                 self.under_way = Some((exchange, request, responses));
             }
         }

@@ -59,12 +59,12 @@ mod tests {
             ..Config::default()
         };
         config.chip.flash = layout.flash_with(&[(configuration::MODE, stored)]);
-        let mut bench = bench_of(config);
+        let mut scene = bench_of(config);
         let mut mode = Mode::default();
-        mode.update(bench.bus.board(0));
+        mode.update(scene.bus.board(0));
         // The firmware reads the switch at power-on only.
-        bench.first().set_dip(1);
-        mode.update(bench.bus.board(0));
+        scene.first().set_dip(1);
+        mode.update(scene.bus.board(0));
         let baud = 9600;
         mode.framing(Settings { baud, format })
     }
@@ -79,24 +79,24 @@ mod tests {
 
     #[test]
     fn stored_mode_is_in_force_from_the_next_start() {
-        let mut bench = bench_of(Config::default());
+        let mut scene = bench_of(Config::default());
         let mut mode = Mode::default();
-        mode.update(bench.bus.board(0));
-        let ascii = bench
+        mode.update(scene.bus.board(0));
+        let ascii = scene
             .bus
             .board(0)
             .layout()
             .flash_with(&[(configuration::MODE, 1)]);
-        bench.first().power_off();
-        bench
+        scene.first().power_off();
+        scene
             .first()
             .flash_mut()
             .unwrap()
             .copy_from_slice(&ascii.unwrap());
-        mode.update(bench.bus.board(0));
+        mode.update(scene.bus.board(0));
         assert_eq!(mode.framing(Settings::default()), Framing::Rtu);
-        bench.first().power_on();
-        mode.update(bench.bus.board(0));
+        scene.first().power_on();
+        mode.update(scene.bus.board(0));
         assert_eq!(mode.framing(Settings::default()), Framing::Ascii);
     }
 }

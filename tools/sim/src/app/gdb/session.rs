@@ -7,7 +7,7 @@ use gdbstub::stub::state_machine::GdbStubStateMachine;
 use gdbstub::stub::{GdbStub, SingleThreadStopReason};
 use sim::Time;
 
-use super::super::bench::Bench;
+use super::super::scene::Scene;
 use super::Message;
 use super::wire::Wire;
 
@@ -15,7 +15,7 @@ use super::wire::Wire;
 /// packet of any length.
 const LONGEST_PACKET: usize = 16 * 1024;
 
-type Machine = GdbStubStateMachine<'static, Bench, Wire>;
+type Machine = GdbStubStateMachine<'static, Scene, Wire>;
 
 /// The session with the debugger, if one is connected.
 #[derive(Default)]
@@ -32,32 +32,32 @@ impl Session {
     }
 
     /// Handles a message from the debugger's thread.
-    pub fn take(&mut self, message: Message, bench: &mut Bench) {
+    pub fn take(&mut self, message: Message, scene: &mut Scene) {
         match message {
-            Message::Connected(stream) => self.start(stream, bench),
+            Message::Connected(stream) => self.start(stream, scene),
             // The next bytes are read when the hold is dropped, after these are handled.
             Message::Bytes(bytes, _hold) => {
                 for byte in bytes {
                     if self.is_too_long(byte) {
                         self.machine = None;
                     }
-                    self.drive(bench, |machine, bench| incoming(machine, byte, bench));
-                    self.step_if_wanted(bench);
+                    self.drive(scene, |machine, scene| incoming(machine, byte, scene));
+                    self.step_if_wanted(scene);
                 }
             }
             Message::Gone => self.machine = None,
         }
         if self.machine.is_none() {
-            bench.remove_breakpoints();
+            scene.remove_breakpoints();
         }
     }
 
     /// Runs the board until `until` or to a breakpoint. Does nothing while the core is halted.
-    pub fn run_until(&mut self, until: Time, bench: &mut Bench) {
+    pub fn run_until(&mut self, until: Time, scene: &mut Scene) {
         if self.machine.is_none() {
-            bench.run_until(until);
-        } else if !self.halted() && bench.run_debugged(until) {
-            self.stopped(bench, SingleThreadStopReason::SwBreak(()));
+            scene.run_until(until);
+        } else if !self.halted() && scene.run_debugged(until) {
+            self.stopped(scene, SingleThreadStopReason::SwBreak(()));
         }
     }
 
@@ -71,26 +71,26 @@ impl Session {
         self.packet.is_some_and(|length| length > LONGEST_PACKET)
     }
 
-    fn start(&mut self, stream: TcpStream, bench: &mut Bench) {
+    fn start(&mut self, stream: TcpStream, scene: &mut Scene) {
         self.packet = None;
         // A debugger that has already disconnected, or that cannot be answered, gets no session.
         self.machine = Wire::new(stream)
             .ok()
-            .and_then(|wire| GdbStub::new(wire).run_state_machine(bench).ok());
+            .and_then(|wire| GdbStub::new(wire).run_state_machine(scene).ok());
     }
 
-    fn step_if_wanted(&mut self, bench: &mut Bench) {
-        if bench.debug.step && self.machine.is_some() && !self.halted() {
-            bench.debug.step = false;
-            bench.first().step_instruction();
-            self.stopped(bench, SingleThreadStopReason::DoneStep);
+    fn step_if_wanted(&mut self, scene: &mut Scene) {
+        if scene.debug.step && self.machine.is_some() && !self.halted() {
+            scene.debug.step = false;
+            scene.first().step_instruction();
+            self.stopped(scene, SingleThreadStopReason::DoneStep);
         }
     }
 
     /// Reports to the debugger that the core has halted.
-    fn stopped(&mut self, bench: &mut Bench, reason: SingleThreadStopReason<u32>) {
-        self.drive(bench, |machine, bench| match machine {
-            GdbStubStateMachine::Running(running) => running.report_stop(bench, reason).ok(),
+    fn stopped(&mut self, scene: &mut Scene, reason: SingleThreadStopReason<u32>) {
+        self.drive(scene, |machine, scene| match machine {
+            GdbStubStateMachine::Running(running) => running.report_stop(scene, reason).ok(),
             other => Some(other),
         });
     }
@@ -98,24 +98,24 @@ impl Session {
     /// Carries out a step of the protocol. Ends the session if the protocol has failed.
     fn drive(
         &mut self,
-        bench: &mut Bench,
-        step: impl FnOnce(Machine, &mut Bench) -> Option<Machine>,
+        scene: &mut Scene,
+        step: impl FnOnce(Machine, &mut Scene) -> Option<Machine>,
     ) {
-        self.machine = self.machine.take().and_then(|machine| step(machine, bench));
+        self.machine = self.machine.take().and_then(|machine| step(machine, scene));
     }
 }
 
 /// Passes a byte from the debugger to the protocol. Returns `None` when the session has ended.
-fn incoming(machine: Machine, byte: u8, bench: &mut Bench) -> Option<Machine> {
+fn incoming(machine: Machine, byte: u8, scene: &mut Scene) -> Option<Machine> {
     let next = match machine {
-        GdbStubStateMachine::Idle(idle) => idle.incoming_data(bench, byte),
-        GdbStubStateMachine::Running(running) => running.incoming_data(bench, byte),
+        GdbStubStateMachine::Idle(idle) => idle.incoming_data(scene, byte),
+        GdbStubStateMachine::Running(running) => running.incoming_data(scene, byte),
         other => Ok(other),
     };
     match next.ok()? {
         GdbStubStateMachine::CtrlCInterrupt(interrupt) => {
             let reason = SingleThreadStopReason::Signal(Signal::SIGINT);
-            interrupt.interrupt_handled(bench, Some(reason)).ok()
+            interrupt.interrupt_handled(scene, Some(reason)).ok()
         }
         // The debugger detaches or wants to kill the program. Either ends the session, and the unit runs on.
         GdbStubStateMachine::Disconnected(_) => None,

@@ -16,7 +16,7 @@ use gdbstub::target::ext::breakpoints::{
 use gdbstub::target::ext::monitor_cmd::{ConsoleOutput, MonitorCmd, MonitorCmdOps};
 use gdbstub::target::{Target, TargetError, TargetResult};
 
-use super::super::bench::Bench;
+use super::super::scene::Scene;
 
 /// Number of registers that GDB gets, in the order of [`CortexM::target_description_xml`] and of
 /// [`sim::Chip::register`].
@@ -92,7 +92,7 @@ impl Registers for CoreRegisters {
     }
 }
 
-impl Bench {
+impl Scene {
     /// Removes every breakpoint.
     pub fn remove_breakpoints(&mut self) {
         for address in core::mem::take(&mut self.debug.breakpoints) {
@@ -120,7 +120,7 @@ impl Bench {
     }
 }
 
-impl Target for Bench {
+impl Target for Scene {
     type Arch = CortexM;
     type Error = Infallible;
 
@@ -137,7 +137,7 @@ impl Target for Bench {
     }
 }
 
-impl SingleThreadBase for Bench {
+impl SingleThreadBase for Scene {
     fn read_registers(&mut self, registers: &mut CoreRegisters) -> TargetResult<(), Self> {
         for (number, register) in registers.0.iter_mut().enumerate() {
             *register = self
@@ -179,7 +179,7 @@ impl SingleThreadBase for Bench {
     }
 }
 
-impl SingleThreadResume for Bench {
+impl SingleThreadResume for Scene {
     fn resume(&mut self, _signal: Option<Signal>) -> Result<(), Infallible> {
         self.debug.step = false;
         self.first().pass_breakpoint();
@@ -191,14 +191,14 @@ impl SingleThreadResume for Bench {
     }
 }
 
-impl SingleThreadSingleStep for Bench {
+impl SingleThreadSingleStep for Scene {
     fn step(&mut self, _signal: Option<Signal>) -> Result<(), Infallible> {
         self.debug.step = true;
         Ok(())
     }
 }
 
-impl Breakpoints for Bench {
+impl Breakpoints for Scene {
     fn support_sw_breakpoint(&mut self) -> Option<SwBreakpointOps<'_, Self>> {
         Some(self)
     }
@@ -208,7 +208,7 @@ impl Breakpoints for Bench {
     }
 }
 
-impl SwBreakpoint for Bench {
+impl SwBreakpoint for Scene {
     fn add_sw_breakpoint(&mut self, address: u32, _kind: usize) -> TargetResult<bool, Self> {
         Ok(self.add_breakpoint(address))
     }
@@ -218,7 +218,7 @@ impl SwBreakpoint for Bench {
     }
 }
 
-impl HwBreakpoint for Bench {
+impl HwBreakpoint for Scene {
     fn add_hw_breakpoint(&mut self, address: u32, _kind: usize) -> TargetResult<bool, Self> {
         Ok(self.add_breakpoint(address))
     }
@@ -228,7 +228,7 @@ impl HwBreakpoint for Bench {
     }
 }
 
-impl MonitorCmd for Bench {
+impl MonitorCmd for Scene {
     fn handle_monitor_cmd(
         &mut self,
         command: &[u8],

@@ -5,15 +5,15 @@ use sim::radio::Parameters;
 use sim::{Channel, Config};
 
 use super::*;
-use crate::app::bench::Bench;
-use crate::app::testing::{bench, bench_of, bench_of_boards};
+use crate::app::scene::Scene;
+use crate::app::testing::{bench_of, bench_of_boards, scene};
 
-fn play(bench: &mut Bench, text: &str) {
-    bench.scenario = Scenario::parse(text, &bench.known()).unwrap();
+fn play(scene: &mut Scene, text: &str) {
+    scene.scenario = Scenario::parse(text, &scene.known()).unwrap();
 }
 
-fn energised(bench: &Bench, board: usize, channel: usize) -> bool {
-    match bench.bus.board(board).channel(channel) {
+fn energised(scene: &Scene, board: usize, channel: usize) -> bool {
+    match scene.bus.board(board).channel(channel) {
         Channel::Di { energised } => energised,
         other => panic!("{other:?}"),
     }
@@ -21,9 +21,9 @@ fn energised(bench: &Bench, board: usize, channel: usize) -> bool {
 
 #[test]
 fn steps_happen_in_time_order_not_in_file_order() {
-    let mut bench = bench(Module::Di4);
+    let mut scene = scene(Module::Di4);
     play(
-        &mut bench,
+        &mut scene,
         r#"
         [[step]]
         at = "20ms"
@@ -39,26 +39,26 @@ fn steps_happen_in_time_order_not_in_file_order() {
         "#,
     );
     let ms = Time::from_ms;
-    bench.run_until(ms(10) - Time::from_us(1));
-    assert!(!energised(&bench, 0, 1));
-    assert_eq!(bench.scenario.next(), Some(ms(10)));
-    bench.run_until(ms(10) + Time::from_us(1));
-    assert!(energised(&bench, 0, 1));
-    assert_eq!(bench.bus.board(0).dip(), 9);
-    bench.run_until(ms(20) + Time::from_us(1));
-    assert!(!energised(&bench, 0, 1));
-    assert_eq!(bench.scenario.next(), None);
+    scene.run_until(ms(10) - Time::from_us(1));
+    assert!(!energised(&scene, 0, 1));
+    assert_eq!(scene.scenario.next(), Some(ms(10)));
+    scene.run_until(ms(10) + Time::from_us(1));
+    assert!(energised(&scene, 0, 1));
+    assert_eq!(scene.bus.board(0).dip(), 9);
+    scene.run_until(ms(20) + Time::from_us(1));
+    assert!(!energised(&scene, 0, 1));
+    assert_eq!(scene.scenario.next(), None);
 }
 
 #[test]
 fn ramp_starts_at_the_present_voltage_and_repeats_in_every_round() {
-    let mut bench = bench(Module::Ai4);
-    let millivolts = |bench: &Bench| match bench.bus.board(0).channel(2) {
+    let mut scene = scene(Module::Ai4);
+    let millivolts = |scene: &Scene| match scene.bus.board(0).channel(2) {
         Channel::Ai { millivolts } => millivolts,
         other => panic!("{other:?}"),
     };
     play(
-        &mut bench,
+        &mut scene,
         r#"
         repeat = "300ms"
         [[step]]
@@ -73,8 +73,8 @@ fn ramp_starts_at_the_present_voltage_and_repeats_in_every_round() {
     );
     let mut seen = Vec::new();
     for ms in [1, 101, 125, 151, 199, 201, 299, 301, 451, 501] {
-        bench.run_until(Time::from_ms(ms));
-        seen.push(millivolts(&bench));
+        scene.run_until(Time::from_ms(ms));
+        seen.push(millivolts(&scene));
     }
     let expected = [1000, 1000, 1200, 1500, 1900, 2000, 2000, 1000, 1500, 2000];
     assert_eq!(seen, expected);
@@ -86,9 +86,9 @@ fn steps_with_a_board_name_change_that_board_only() {
         module,
         ..Config::default()
     };
-    let mut bench = bench_of_boards([("a", config(Module::Di4)), ("b", config(Module::Di4))]);
+    let mut scene = bench_of_boards([("a", config(Module::Di4)), ("b", config(Module::Di4))]);
     play(
-        &mut bench,
+        &mut scene,
         r#"
         [[step]]
         at = "10ms"
@@ -115,32 +115,32 @@ fn steps_with_a_board_name_change_that_board_only() {
         faults = { hse_failed = true, noise_hz = 5.0 }
         "#,
     );
-    let powered = |bench: &Bench| [0, 1].map(|n| bench.bus.board(n).powered());
+    let powered = |scene: &Scene| [0, 1].map(|n| scene.bus.board(n).powered());
     let mut seen = Vec::new();
     for ms in [5, 15, 35, 45, 145] {
-        bench.run_until(Time::from_ms(ms));
-        seen.push(powered(&bench));
+        scene.run_until(Time::from_ms(ms));
+        seen.push(powered(&scene));
     }
     let on = [true, true];
     assert_eq!(seen, [on, [true, false], on, [false, true], on]);
-    let modules = [0, 1].map(|n| bench.bus.board(n).module());
+    let modules = [0, 1].map(|n| scene.bus.board(n).module());
     assert_eq!(
         modules,
         [Module::Di4, Module::Ai4],
         "changing the module of board a is refused, because its power is on"
     );
-    assert!(bench.bus.board(0).crystal() && !bench.bus.board(1).crystal());
-    assert!((bench.disturbance.noise_hz() - 5.0).abs() < 1e-9);
+    assert!(scene.bus.board(0).crystal() && !scene.bus.board(1).crystal());
+    assert!((scene.disturbance.noise_hz() - 5.0).abs() < 1e-9);
 }
 
 #[test]
 fn step_sets_the_loss_of_radio_packets() {
-    let mut bench = bench_of(Config {
+    let mut scene = bench_of(Config {
         radio: Some(Parameters::FACTORY),
         ..Config::default()
     });
     play(
-        &mut bench,
+        &mut scene,
         r#"
         [[step]]
         at = "10ms"
@@ -149,15 +149,15 @@ fn step_sets_the_loss_of_radio_packets() {
     );
     let mut seen = Vec::new();
     for ms in [9, 11] {
-        bench.run_until(Time::from_ms(ms));
-        seen.extend(bench.bus.air().map(|air| air.loss()));
+        scene.run_until(Time::from_ms(ms));
+        seen.extend(scene.bus.air().map(|air| air.loss()));
     }
     assert_eq!(seen, [0.0, 0.5]);
 }
 
 #[test]
 fn scenario_error_is_one_line_that_names_the_line_or_the_step() {
-    let bench = bench(Module::Di4);
+    let scene = scene(Module::Di4);
     for (text, part) in [
         ("", "no [[step]]"),
         ("[[step]]\nat = 5", "line 2"),
@@ -221,7 +221,7 @@ fn scenario_error_is_one_line_that_names_the_line_or_the_step() {
         ("repeat = '1s'\n[[step]]\nat = '2s'\ndip = 1", "`repeat`"),
         ("repeat = '1ns'\n[[step]]\nat = '0s'\ndip = 1", "`repeat`"),
     ] {
-        let what = Scenario::parse(text, &bench.known()).unwrap_err();
+        let what = Scenario::parse(text, &scene.known()).unwrap_err();
         assert!(what.contains(part), "{text:?}: {what}");
         assert!(!what.contains('\n'), "{what:?}");
     }

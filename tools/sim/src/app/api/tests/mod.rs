@@ -10,37 +10,37 @@ use register_map::Module;
 
 use super::*;
 use crate::app::Origin;
-use crate::app::testing::{bench, bench_of, bench_of_boards};
+use crate::app::testing::{bench_of, bench_of_boards, scene};
 use sim::{Config, board};
 
-fn get(bench: &mut Bench, target: &str) -> Reply {
-    ask(bench, "GET", target, "")
+fn get(scene: &mut Scene, target: &str) -> Reply {
+    ask(scene, "GET", target, "")
 }
 
-fn post(bench: &mut Bench, target: &str, body: &str) -> Reply {
-    ask(bench, "POST", target, body)
+fn post(scene: &mut Scene, target: &str, body: &str) -> Reply {
+    ask(scene, "POST", target, body)
 }
 
-fn ask(bench: &mut Bench, method: &str, target: &str, body: &str) -> Reply {
+fn ask(scene: &mut Scene, method: &str, target: &str, body: &str) -> Reply {
     let request = Request {
         method: method.to_owned(),
         target: target.to_owned(),
         body: body.as_bytes().to_vec(),
     };
-    answer(bench, &request)
+    answer(scene, &request)
 }
 
-fn state(bench: &mut Bench) -> Value {
-    let reply = get(bench, "/api/state");
+fn state(scene: &mut Scene) -> Value {
+    let reply = get(scene, "/api/state");
     assert_eq!(reply.status, 200);
     reply.body
 }
 
 #[test]
 fn state_has_every_documented_entry() {
-    let mut bench = bench(Module::Di4);
-    bench.bus.run_for(sim::Time::from_ms(3));
-    let state = state(&mut bench);
+    let mut scene = scene(Module::Di4);
+    scene.bus.run_for(sim::Time::from_ms(3));
+    let state = state(&mut scene);
     assert_eq!(state["virtual_ms"], 3);
     assert_eq!(state["dip"], 1);
     assert_eq!(state["module"], "4di");
@@ -57,18 +57,18 @@ fn state_has_every_documented_entry() {
 
 #[test]
 fn post_to_a_channel_changes_this_channel_only() {
-    let mut di = bench(Module::Di4);
+    let mut di = scene(Module::Di4);
     let reply = post(&mut di, "/api/channels/3", r#"{"energised":true}"#);
     assert_eq!(reply.status, 200);
     assert_eq!(reply.body["channels"][2]["energised"], true);
     assert_eq!(state(&mut di)["channels"][1]["energised"], false);
 
-    let mut relay = bench(Module::Relay2);
+    let mut relay = scene(Module::Relay2);
     post(&mut relay, "/api/channels/2", r#"{"manual":true}"#);
     assert_eq!(state(&mut relay)["channels"][1]["manual"], true);
     assert_eq!(state(&mut relay)["channels"][2], json!({ "kind": "none" }));
 
-    let mut ai = bench(Module::Ai4);
+    let mut ai = scene(Module::Ai4);
     post(&mut ai, "/api/channels/4", r#"{"millivolts":3300}"#);
     assert_eq!(
         state(&mut ai)["channels"][3],
@@ -78,10 +78,10 @@ fn post_to_a_channel_changes_this_channel_only() {
 
 #[test]
 fn change_that_the_channel_does_not_have_returns_409() {
-    let mut bench = bench(Module::Di4);
+    let mut scene = scene(Module::Di4);
     for body in [r#"{"manual":true}"#, r#"{"millivolts":100}"#] {
         assert_eq!(
-            post(&mut bench, "/api/channels/1", body).status,
+            post(&mut scene, "/api/channels/1", body).status,
             409,
             "{body}"
         );
@@ -90,8 +90,8 @@ fn change_that_the_channel_does_not_have_returns_409() {
 
 #[test]
 fn request_to_the_unit_without_a_reply_returns_504_and_without_an_address_409() {
-    let mut bench = bench(Module::Di4);
-    let mut status = |body: &str| post(&mut bench, "/api/pdu", body).status;
+    let mut scene = scene(Module::Di4);
+    let mut status = |body: &str| post(&mut scene, "/api/pdu", body).status;
     assert_eq!(
         status(r#"{"pdu":"0300100004"}"#),
         504,
@@ -101,69 +101,69 @@ fn request_to_the_unit_without_a_reply_returns_504_and_without_an_address_409() 
     for body in [r#"{"pdu":""}"#, r#"{"pdu":"0"}"#, r#"{"pdu":"+7"}"#, &long] {
         assert_eq!(status(body), 400, "{body}");
     }
-    assert_eq!(state(&mut bench)["line"]["rx_frames"], 1);
-    post(&mut bench, "/api/power", r#"{"on":false}"#);
-    let off = post(&mut bench, "/api/pdu", r#"{"pdu":"07"}"#);
+    assert_eq!(state(&mut scene)["line"]["rx_frames"], 1);
+    post(&mut scene, "/api/power", r#"{"on":false}"#);
+    let off = post(&mut scene, "/api/pdu", r#"{"pdu":"07"}"#);
     assert_eq!(off.status, 409);
 }
 
 #[test]
 fn power_dip_and_module_change_and_the_module_only_with_the_power_off() {
-    let mut bench = bench(Module::Di4);
+    let mut scene = scene(Module::Di4);
     assert_eq!(
-        post(&mut bench, "/api/module", r#"{"name":"4do"}"#).status,
+        post(&mut scene, "/api/module", r#"{"name":"4do"}"#).status,
         409,
         "power is on"
     );
-    let off = post(&mut bench, "/api/power", r#"{"on":false}"#);
+    let off = post(&mut scene, "/api/power", r#"{"on":false}"#);
     assert_eq!((off.status, &off.body["powered"]), (200, &json!(false)));
-    let plugged = post(&mut bench, "/api/module", r#"{"name":"4do"}"#);
+    let plugged = post(&mut scene, "/api/module", r#"{"name":"4do"}"#);
     assert_eq!(
         (plugged.status, &plugged.body["module"]),
         (200, &json!("4do"))
     );
     assert_eq!(
-        post(&mut bench, "/api/power", r#"{"on":true}"#).body["powered"],
+        post(&mut scene, "/api/power", r#"{"on":true}"#).body["powered"],
         true
     );
-    assert_eq!(state(&mut bench)["channels"][0]["kind"], "do");
+    assert_eq!(state(&mut scene)["channels"][0]["kind"], "do");
     assert_eq!(
-        post(&mut bench, "/api/dip", r#"{"value":247}"#).body["dip"],
+        post(&mut scene, "/api/dip", r#"{"value":247}"#).body["dip"],
         247
     );
-    let before = bench.now();
+    let before = scene.now();
     assert_eq!(
-        post(&mut bench, "/api/power", r#"{"cycle":true}"#).body["powered"],
+        post(&mut scene, "/api/power", r#"{"cycle":true}"#).body["powered"],
         true
     );
-    assert!(bench.now() > before);
+    assert!(scene.now() > before);
 }
 
 #[test]
 fn frames_since_a_number_are_the_later_ones() {
-    let mut bench = bench(Module::Di4);
+    let mut scene = scene(Module::Di4);
     for _ in 0..2 {
-        bench.bus.run_for(sim::Time::from_ms(1));
-        bench.send(
+        scene.bus.run_for(sim::Time::from_ms(1));
+        scene.send(
             &[0x01, 0x01, 0x00, 0x10, 0x00, 0x04, 0x3C, 0x0C],
             Origin::Pty,
         );
-        bench.bus.run_for(sim::Time::from_ms(20));
+        scene.bus.run_for(sim::Time::from_ms(20));
     }
-    let all = get(&mut bench, "/api/frames").body;
+    let all = get(&mut scene, "/api/frames").body;
     assert_eq!(all["frames"].as_array().unwrap().len(), 2);
     assert_eq!(all["frames"][0]["crc_ok"], true);
     assert_eq!(all["frames"][0]["bytes"], "0101001000043c0c");
     let first = all["frames"][0]["number"].as_u64().unwrap();
-    let later = get(&mut bench, &format!("/api/frames?since={first}")).body;
+    let later = get(&mut scene, &format!("/api/frames?since={first}")).body;
     assert_eq!(later["frames"], json!([all["frames"][1]]));
-    assert_eq!(state(&mut bench)["line"]["rx_frames"], 2);
+    assert_eq!(state(&mut scene)["line"]["rx_frames"], 2);
 }
 
 #[test]
 fn malformed_request_is_refused_and_changes_nothing() {
-    let mut bench = bench(Module::Di4);
-    let before = state(&mut bench);
+    let mut scene = scene(Module::Di4);
+    let before = state(&mut scene);
     for (method, target, body, status) in [
         ("GET", "/api", "", 404),
         ("GET", "/api/", "", 404),
@@ -223,7 +223,7 @@ fn malformed_request_is_refused_and_changes_nothing() {
         ("POST", "/api/module", r#"{"name":"8di"}"#, 400),
         ("POST", "/api/module", r#"{"name":4}"#, 400),
     ] {
-        let reply = ask(&mut bench, method, target, body);
+        let reply = ask(&mut scene, method, target, body);
         assert_eq!(
             reply.status, status,
             "{method} {target} {body}: {}",
@@ -232,7 +232,7 @@ fn malformed_request_is_refused_and_changes_nothing() {
         let error = reply.body["error"].as_str().unwrap();
         assert!(!error.is_empty());
     }
-    assert_eq!(state(&mut bench), before);
+    assert_eq!(state(&mut scene), before);
 }
 
 /// JSON values that other programs send for `off`, for a number, or by mistake, and text that is not JSON.
@@ -284,8 +284,8 @@ fn value_that_is_not_exactly_of_its_type_is_refused_and_changes_nothing() {
             &["1", "0", "7.0", "7.5", "7e0", "-0", "256", "3301"],
         ),
     ] {
-        let bench = &mut bench(module);
-        let before = (state(bench), get(bench, "/api/faults"));
+        let scene = &mut scene(module);
+        let before = (state(scene), get(scene, "/api/faults"));
         for value in VALUES.iter().filter(|value| !accepted.contains(value)) {
             // The value alone, beside a correct value, and after a correct value with the same name.
             let good = accepted.first().unwrap_or(&"\"4di\"");
@@ -296,22 +296,22 @@ fn value_that_is_not_exactly_of_its_type_is_refused_and_changes_nothing() {
                 format!("{{\"{key}\":{good},\"{key}\":{good}}}"),
                 format!("{{\"{key}\":{good}}} {value}"),
             ] {
-                let reply = post(bench, target, &body);
+                let reply = post(scene, target, &body);
                 assert_eq!(reply.status, 400, "{target} {body}: {}", reply.body);
             }
             if serde_json::from_str::<Value>(value).is_ok() {
-                let reply = post(bench, target, &format!("{{\"{key}\":{value}}}"));
+                let reply = post(scene, target, &format!("{{\"{key}\":{value}}}"));
                 let error = reply.body["error"].as_str().unwrap();
                 assert!(error.starts_with('`'), "{key}: {value}: {error}");
             }
         }
-        assert_eq!((state(bench), get(bench, "/api/faults")), before);
+        assert_eq!((state(scene), get(scene, "/api/faults")), before);
     }
 }
 
 #[test]
 fn reason_of_a_refusal_is_one_short_line() {
-    let mut bench = bench(Module::Di4);
+    let mut scene = scene(Module::Di4);
     let long = "x\\n\\u001b[31m".repeat(1000);
     for (target, body) in [
         ("/api/dip", format!("{{\"{long}\":1}}")),
@@ -319,7 +319,7 @@ fn reason_of_a_refusal_is_one_short_line() {
         ("/api/faults", format!("{{\"{long}\":1}}")),
         (&format!("/api/{long}"), "{}".to_owned()),
     ] {
-        let reply = post(&mut bench, target, &body);
+        let reply = post(&mut scene, target, &body);
         assert!((400..=404).contains(&reply.status));
         let error = reply.body["error"].as_str().unwrap();
         assert!(!error.contains(char::is_control), "{error:?}");
@@ -338,9 +338,9 @@ fn finding_has_address_time_and_count() {
     let image = Image::from_bytes(&image).unwrap();
     let board = sim::Board::new(&image, Config::default()).unwrap();
     let unit = crate::app::unit::Unit::new("modio-02".to_owned(), None);
-    let mut bench = Bench::new(vec![(board, unit)]);
-    bench.bus.run_for(sim::Time::from_ms(10));
-    let found = get(&mut bench, "/api/findings").body["findings"][0].take();
+    let mut scene = Scene::new(vec![(board, unit)]);
+    scene.bus.run_for(sim::Time::from_ms(10));
+    let found = get(&mut scene, "/api/findings").body["findings"][0].take();
     assert_eq!(found["pc"], "0x0800000a", "{found}");
     assert!(
         found["what"].as_str().unwrap().contains("0x40011000"),
@@ -351,28 +351,28 @@ fn finding_has_address_time_and_count() {
 
 #[test]
 fn faults_are_caused_reported_and_cleared() {
-    let mut bench = bench(Module::Ao4);
+    let mut scene = scene(Module::Ao4);
     let none = json!({
         "bit_error_rate": 0.0, "drop_rate": 0.0, "noise_hz": 0.0,
         "i2c_absent": false, "hse_failed": false, "hsi_percent": 0.0, "lsi_khz": 40.0,
     });
-    assert_eq!(get(&mut bench, "/api/faults").body, none);
+    assert_eq!(get(&mut scene, "/api/faults").body, none);
     let all = json!({
         "bit_error_rate": 0.001, "drop_rate": 0.5, "noise_hz": 10.0,
         "i2c_absent": true, "hse_failed": true, "hsi_percent": -1.5, "lsi_khz": 30.0,
     });
-    let made = post(&mut bench, "/api/faults", &all.to_string());
+    let made = post(&mut scene, "/api/faults", &all.to_string());
     assert_eq!((made.status, &made.body), (200, &all));
     // 8 MHz minus 1.5 %, because the core runs from the HSI.
-    assert_eq!(bench.first().hclk(), 7_880_000);
-    assert!(!bench.first().crystal());
-    let one = post(&mut bench, "/api/faults", r#"{"i2c_absent":false}"#).body;
+    assert_eq!(scene.first().hclk(), 7_880_000);
+    assert!(!scene.first().crystal());
+    let one = post(&mut scene, "/api/faults", r#"{"i2c_absent":false}"#).body;
     assert_eq!(
         (&one["i2c_absent"], &one["drop_rate"]),
         (&json!(false), &json!(0.5))
     );
     assert_eq!(
-        post(&mut bench, "/api/faults", &none.to_string()).body,
+        post(&mut scene, "/api/faults", &none.to_string()).body,
         none
     );
 
@@ -389,12 +389,12 @@ fn faults_are_caused_reported_and_cleared() {
         r#"{"lsi_khz":14}"#,
         r#"{"hse_failed":true,"lsi_khz":900}"#,
     ] {
-        assert_eq!(post(&mut bench, "/api/faults", body).status, 400, "{body}");
+        assert_eq!(post(&mut scene, "/api/faults", body).status, 400, "{body}");
     }
     assert_eq!(
-        get(&mut bench, "/api/faults").body,
+        get(&mut scene, "/api/faults").body,
         none,
         "a refused request changes nothing"
     );
-    assert_eq!(ask(&mut bench, "DELETE", "/api/faults", "").status, 405);
+    assert_eq!(ask(&mut scene, "DELETE", "/api/faults", "").status, 405);
 }

@@ -19,7 +19,7 @@ use super::scenario::{Input, Known, Scenario};
 use super::unit::Unit;
 
 /// The boards on one line and the state of the command that belongs to them.
-pub struct Bench {
+pub struct Scene {
     /// The boards and their line.
     pub bus: Bus,
     /// Name, log and flash file of each board, in the order of the bus.
@@ -36,8 +36,8 @@ pub struct Bench {
     sending: VecDeque<(Time, Origin, Vec<u8>)>,
 }
 
-impl Bench {
-    /// Returns a bench with these boards; at least one.
+impl Scene {
+    /// Returns a scene with these boards; at least one.
     pub fn new(boards: Vec<(Board, Unit)>) -> Self {
         let (boards, units) = boards.into_iter().unzip();
         let mut bus = Bus::new(boards);
@@ -311,20 +311,20 @@ mod tests {
     use register_map::Module;
 
     use super::*;
-    use crate::app::testing::bench;
+    use crate::app::testing::scene;
 
     #[test]
     fn bytes_of_a_client_are_returned_when_they_have_been_on_the_line() {
-        let mut bench = bench(Module::Di4);
-        let end = bench.send(&[1, 2, 3], Origin::Pty);
-        bench.put(vec![4], Origin::Gateway);
-        bench.run_until(end.saturating_sub(Time::from_us(10)));
-        assert!(bench.take_sent().is_empty());
-        bench.run_until(end);
-        let sent = bench.take_sent();
+        let mut scene = scene(Module::Di4);
+        let end = scene.send(&[1, 2, 3], Origin::Pty);
+        scene.put(vec![4], Origin::Gateway);
+        scene.run_until(end.saturating_sub(Time::from_us(10)));
+        assert!(scene.take_sent().is_empty());
+        scene.run_until(end);
+        let sent = scene.take_sent();
         assert!(matches!(&sent[..], [(Origin::Pty, bytes)] if bytes == &[1, 2, 3]));
-        bench.run_until(end + Time::from_ms(2));
-        let sent = bench.take_sent();
+        scene.run_until(end + Time::from_ms(2));
+        let sent = scene.take_sent();
         assert!(matches!(&sent[..], [(Origin::Gateway, bytes)] if bytes == &[4]));
     }
 }
