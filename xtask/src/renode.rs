@@ -72,7 +72,7 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     eprintln!("Renode {} at {}", renode.version, renode.program.display());
     let board = options.given.board();
     let (elf, image) = options.firmware(workspace)?;
-    let bench = Bench {
+    let setup = Setup {
         directory: workspace.root.join(DIRECTORY),
         output: workspace.target.join("renode").join(board.name),
         board,
@@ -81,11 +81,11 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
         image,
     };
     if options.interactive {
-        return live::interact(&bench, options.module, options.dip, options.port);
+        return live::interact(&setup, options.module, options.dip, options.port);
     }
     let conformance = workspace.program("modio-conformance")?;
     let python = checks::python(workspace)?;
-    bench.run(&conformance, &python)
+    setup.run(&conformance, &python)
 }
 
 impl Options {
@@ -103,7 +103,7 @@ impl Options {
 }
 
 /// Everything that a run in Renode needs.
-struct Bench {
+struct Setup {
     /// The project's files for Renode.
     directory: PathBuf,
     /// Directory of the results.
@@ -116,7 +116,7 @@ struct Bench {
     image: Option<PathBuf>,
 }
 
-impl Bench {
+impl Setup {
     /// Runs the suites in Renode and then the program `conformance`, and writes a summary of both.
     fn run(&self, conformance: &Path, python: &Path) -> Result<()> {
         // Results of an earlier run would be mistaken for those of this one.

@@ -1,11 +1,11 @@
 //! Tests of the radio with a simulated module.
 
-mod bench;
+mod fake_module;
 
 use embedded_hal_nb::serial::{self, ErrorKind};
 
 use super::*;
-use bench::*;
+use fake_module::*;
 
 const SET_ALL: &[u8] = &[0xC0, 0x00, 0x07, 0x1A, 0x17, 0x47];
 

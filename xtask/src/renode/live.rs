@@ -11,7 +11,7 @@ use anyhow::{Result, bail, ensure};
 use fs_err::{self as fs, File};
 use register_map::Module;
 
-use super::Bench;
+use super::Setup;
 use crate::command;
 use crate::debug::free_port;
 use crate::group::Group;
@@ -24,11 +24,11 @@ const END: Duration = Duration::from_secs(10);
 
 /// Runs the conformance suite against the board in Renode with this module. The results are in `conformance-MODULE.*`
 /// in the output directory.
-pub fn conformance(bench: &Bench, module: Module, suite: &Path) -> Result<()> {
+pub fn conformance(setup: &Setup, module: Module, suite: &Path) -> Result<()> {
     let (port, monitor) = (free_port()?, free_port()?);
-    let script = write_script(bench, "-exact", module, 1, port)?;
-    let log = bench.output.join(format!("renode-{module}.log"));
-    let mut renode = start(bench, &script, monitor, &log)?;
+    let script = write_script(setup, "-exact", module, 1, port)?;
+    let log = setup.output.join(format!("renode-{module}.log"));
+    let mut renode = start(setup, &script, monitor, &log)?;
     let end = Instant::now() + START;
     while TcpStream::connect((Ipv4Addr::LOCALHOST, port)).is_err() {
         let ended = renode.wait(Duration::from_millis(100))?.is_some();
@@ -44,7 +44,7 @@ pub fn conformance(bench: &Bench, module: Module, suite: &Path) -> Result<()> {
     command.args(["--unit", "1", "--allow-config"]);
     for (option, extension) in [("--junit", "xml"), ("--json", "json")] {
         let name = format!("conformance-{module}.{extension}");
-        command.arg(option).arg(bench.output.join(name));
+        command.arg(option).arg(setup.output.join(name));
     }
     let status = Group::start(command)?.wait(Duration::MAX)?;
     let died = renode.ended()?.is_some();
@@ -68,19 +68,19 @@ pub fn conformance(bench: &Bench, module: Module, suite: &Path) -> Result<()> {
 }
 
 /// Starts the board for a person, with Renode's monitor on the terminal.
-pub fn interact(bench: &Bench, module: Module, dip: u8, port: u16) -> Result<()> {
-    fs::create_dir_all(&bench.output)?;
-    let script = write_script(bench, "", module, dip, port)?;
+pub fn interact(setup: &Setup, module: Module, dip: u8, port: u16) -> Result<()> {
+    fs::create_dir_all(&setup.output)?;
+    let script = write_script(setup, "", module, dip, port)?;
     say!("the line: 127.0.0.1:{port}, raw bytes; unit {dip}, {module} in the first slot");
     say!("in the monitor: modio_log shows the firmware's log, quit ends Renode");
-    let mut renode = Command::new(&bench.renode.program);
+    let mut renode = Command::new(&setup.renode.program);
     // The terminal is the input, from which Renode also receives Ctrl-C.
     command::run(renode.arg("--console").arg(script))
 }
 
-fn start(bench: &Bench, script: &Path, monitor: u16, log: &Path) -> Result<Group> {
+fn start(setup: &Setup, script: &Path, monitor: u16, log: &Path) -> Result<Group> {
     let log = File::create(log)?.into_file();
-    let mut renode = Command::new(&bench.renode.program);
+    let mut renode = Command::new(&setup.renode.program);
     // The monitor on a socket needs no terminal.
     renode.args(["--disable-gui", "--plain", "--port", &monitor.to_string()]);
     renode.arg(script).stdout(log.try_clone()?).stderr(log);
@@ -96,16 +96,16 @@ fn reason(log: &Path) -> String {
 
 /// Writes the script that sets images and board, and then includes the script of the board with this kind of line:
 /// `-exact` for the exact-line protocol, or nothing for the socket of a person.
-fn write_script(bench: &Bench, line: &str, module: Module, dip: u8, port: u16) -> Result<PathBuf> {
-    let script = bench.output.join("run.resc");
-    let image = bench.image.as_deref();
+fn write_script(setup: &Setup, line: &str, module: Module, dip: u8, port: u16) -> Result<PathBuf> {
+    let script = setup.output.join("run.resc");
+    let image = setup.image.as_deref();
     let image = image.map_or("$plain=true".to_owned(), |image| {
         format!("$image={}", token(image))
     });
     let text = format!(
         "$elf={}\n{image}\n$dip={dip}\n$module=\"{module}\"\n$port={port}\ninclude {}\n",
-        token(&bench.elf),
-        token(&bench.directory.join(format!("{}{line}.resc", bench.board))),
+        token(&setup.elf),
+        token(&setup.directory.join(format!("{}{line}.resc", setup.board))),
     );
     fs::write(&script, text)?;
     Ok(script)

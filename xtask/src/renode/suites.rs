@@ -8,27 +8,27 @@ use anyhow::{Result, bail, ensure};
 use fs_err as fs;
 use register_map::Board;
 
-use super::Bench;
+use super::Setup;
 use crate::group::Group;
 use crate::{command, python};
 
 /// Runs all suites. The results are in `robot` in the output directory, and as JUnit XML in `robot.xml`.
-pub fn run(bench: &Bench, python: &Path) -> Result<()> {
-    let output = bench.output.join("robot");
+pub fn run(setup: &Setup, python: &Path) -> Result<()> {
+    let output = setup.output.join("robot");
     fs::create_dir_all(&output)?;
-    let mut tester = Command::new(bench.renode.tester()?);
+    let mut tester = Command::new(setup.renode.tester()?);
     tester.arg("-r").arg(&output);
-    tester.args(["--variable", &format!("ELF:{}", bench.elf.display())]);
-    let image = match &bench.image {
+    tester.args(["--variable", &format!("ELF:{}", setup.elf.display())]);
+    let image = match &setup.image {
         Some(image) => format!("IMAGE:{}", image.display()),
         None => "PLAIN:true".to_owned(),
     };
     tester.args(["--variable", &image]);
-    tester.args(["--variable", &format!("BOARD_NAME:{}", bench.board)]);
-    tester.args(all(&bench.directory, bench.board)?);
+    tester.args(["--variable", &format!("BOARD_NAME:{}", setup.board)]);
+    tester.args(all(&setup.directory, setup.board)?);
     let status = Group::start(tester)?.wait(Duration::MAX)?;
     // Convert the results even when tests failed, so that they can be shown.
-    let converted = to_junit(python, &output, &bench.output.join("robot.xml"));
+    let converted = to_junit(python, &output, &setup.output.join("robot.xml"));
     let output = output.display();
     match status.and_then(|status| status.code()) {
         Some(0) => converted,

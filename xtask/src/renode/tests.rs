@@ -44,8 +44,8 @@ impl Fake {
         Renode::find(Some(&self.at("renode")))
     }
 
-    fn bench(&self) -> Bench {
-        let bench = Bench {
+    fn setup(&self) -> Setup {
+        let setup = Setup {
             directory: Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../renode")).to_owned(),
             output: self.at("output with a space"),
             board: &register_map::board::MODIO_08,
@@ -53,27 +53,27 @@ impl Fake {
             elf: self.at("loader"),
             image: Some(self.at("modio-a.image")),
         };
-        fs::create_dir_all(&bench.output).unwrap();
-        bench
+        fs::create_dir_all(&setup.output).unwrap();
+        setup
     }
 
     /// The same with the image that runs without a loader.
-    fn plain(&self) -> Bench {
-        Bench {
+    fn plain(&self) -> Setup {
+        Setup {
             elf: self.at("modio"),
             image: None,
-            ..self.bench()
+            ..self.setup()
         }
     }
 
-    fn suites(&self, bench: &Bench, rebot: &str) -> Result<()> {
+    fn suites(&self, setup: &Setup, rebot: &str) -> Result<()> {
         self.program("python", rebot);
-        suites::run(bench, &self.at("python"))
+        suites::run(setup, &self.at("python"))
     }
 
-    fn conformance(&self, bench: &Bench, script: &str) -> Result<()> {
+    fn conformance(&self, setup: &Setup, script: &str) -> Result<()> {
         self.program("conformance", script);
-        live::conformance(bench, Module::Do4, &self.at("conformance"))
+        live::conformance(setup, Module::Do4, &self.at("conformance"))
     }
 
     fn calls(&self) -> Vec<String> {
@@ -124,7 +124,7 @@ fn old_or_broken_renode_is_refused() {
 fn suites_run_with_image_and_board_and_their_end_is_reported() {
     let fake = Fake::new();
     let rebot = r#"[ "$3" = robot.rebot ] || exit 252; echo "rebot $*" >> "$CALLS""#;
-    fake.suites(&fake.bench(), rebot).unwrap();
+    fake.suites(&fake.setup(), rebot).unwrap();
     fake.suites(&fake.plain(), rebot).unwrap();
     let calls = fake.calls();
     let at = |name| fake.at(name).display().to_string();
@@ -145,11 +145,11 @@ fn suites_run_with_image_and_board_and_their_end_is_reported() {
         ("exit 5", "exit 0", "status Some(5)"),
     ] {
         fake.program("renode-test", test);
-        let text = message(fake.suites(&fake.bench(), rebot));
+        let text = message(fake.suites(&fake.setup(), rebot));
         assert!(text.contains(expected), "{text}");
     }
     fs::remove_file(fake.at("renode-test")).unwrap();
-    let text = message(fake.suites(&fake.bench(), "exit 0"));
+    let text = message(fake.suites(&fake.setup(), "exit 0"));
     assert!(text.contains("no renode-test beside"), "{text}");
 }
 
@@ -157,7 +157,7 @@ fn suites_run_with_image_and_board_and_their_end_is_reported() {
 fn conformance_suite_runs_against_the_board_in_renode() {
     let fake = Fake::new();
     let note = r#"echo "conformance $*" >> "$CALLS""#;
-    fake.conformance(&fake.bench(), note).unwrap();
+    fake.conformance(&fake.setup(), note).unwrap();
     let calls = fake.calls();
     let [renode, conformance, monitor] = calls.as_slice() else {
         panic!("{calls:?}");
@@ -182,7 +182,7 @@ fn conformance_suite_runs_against_the_board_in_renode() {
     fake.conformance(&fake.plain(), note).unwrap();
     let expected = format!("$elf=@{}\n$plain=true\n$dip=1\n", at("modio"));
     assert!(script().starts_with(&expected), "{}", script());
-    let text = message(fake.conformance(&fake.bench(), "exit 1"));
+    let text = message(fake.conformance(&fake.setup(), "exit 1"));
     assert_eq!(text, "cases failed");
 }
 
@@ -191,13 +191,13 @@ fn renode_that_does_not_start_or_dies_is_a_failure_even_if_all_cases_passed() {
     let fake = Fake::new();
     let start = "[ \"$1\" = --version ] || echo $$ > \"$CALLS.pid\"";
     fake.program("renode", &format!("{start}\n{RENODE}"));
-    let bench = fake.bench();
+    let setup = fake.setup();
     let kill = "kill -KILL $(cat \"$CALLS.pid\"); sleep 0.5";
-    let text = message(fake.conformance(&bench, kill));
+    let text = message(fake.conformance(&setup, kill));
     assert!(text.starts_with("Renode ended before"), "{text}");
     let no_type = "echo 'Renode v1.16.1'; echo 'Error E25: no such type'; echo bye";
     fake.program("renode", no_type);
-    let text = message(fake.conformance(&bench, "echo tried >> \"$CALLS\""));
+    let text = message(fake.conformance(&setup, "echo tried >> \"$CALLS\""));
     let expected = "Renode does not start the board: Error E25: no such type";
     assert_eq!(text, expected);
     assert!(!fake.calls().contains(&"tried".to_owned()));
