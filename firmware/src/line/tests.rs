@@ -175,7 +175,7 @@ impl GapTimer for FakeGap {
 }
 
 /// Unit 17 with ten registers of value 0x1111.
-struct Bench {
+struct Rig {
     line: Line<FakeUart, FakeGap, FastUnit>,
     server: Server,
     registers: [u16; 10],
@@ -191,7 +191,7 @@ const WINDOWS: Windows = Windows {
     guard: 10,
 };
 
-impl Bench {
+impl Rig {
     fn new() -> Self {
         let adus = Box::leak(Box::new([Adu::new(), Adu::new()]));
         let units = FastUnit {
@@ -200,16 +200,16 @@ impl Bench {
         };
         let port = Port::new(Receiver::rtu(units, false), adus);
         let (uart, gap) = (FakeUart::default(), FakeGap::default());
-        let mut bench = Self {
+        let mut rig = Self {
             line: Line::new(uart, gap, port, WINDOWS, LONGEST_MS),
             server: Server::new(Framing::Rtu),
             registers: [0x1111; 10],
         };
         assert!(
-            !bench.silence(Silence::T35),
+            !rig.silence(Silence::T35),
             "the port is idle after a long silence"
         );
-        bench
+        rig
     }
 
     fn silence(&mut self, silence: Silence) -> bool {
@@ -255,101 +255,98 @@ impl Bench {
 
 #[test]
 fn request_is_served_with_the_driver_on_from_the_first_byte_to_the_last() {
-    let mut bench = Bench::new();
-    bench.receive(&REQUEST);
-    assert!(!bench.line.uart.driver);
-    assert!(!bench.silence(Silence::T15));
-    assert!(bench.silence(Silence::T35), "a request waits");
-    bench.serve();
-    assert!(bench.line.uart.driver && bench.line.gap.limited);
+    let mut rig = Rig::new();
+    rig.receive(&REQUEST);
+    assert!(!rig.line.uart.driver);
+    assert!(!rig.silence(Silence::T15));
+    assert!(rig.silence(Silence::T35), "a request waits");
+    rig.serve();
+    assert!(rig.line.uart.driver && rig.line.gap.limited);
     assert!(
-        !bench.line.gap.running,
+        !rig.line.gap.running,
         "no silence is measured after the unit's own reply"
     );
-    bench.send();
-    assert_eq!(bench.line.uart.sent, REPLY);
-    assert!(!bench.line.uart.driver && !bench.line.is_replying());
-    assert!(!bench.pass(100));
+    rig.send();
+    assert_eq!(rig.line.uart.sent, REPLY);
+    assert!(!rig.line.uart.driver && !rig.line.is_replying());
+    assert!(!rig.pass(100));
 }
 
 #[test]
 fn timer_that_stopped_in_a_frame_is_started_again() {
-    let mut bench = Bench::new();
-    bench.receive(&REQUEST[..3]);
-    assert!(!bench.pass(3));
-    bench.line.gap.running = false;
-    assert!(bench.pass(1) && bench.line.gap.running);
-    assert!(!bench.pass(3), "a repair is reported once");
+    let mut rig = Rig::new();
+    rig.receive(&REQUEST[..3]);
+    assert!(!rig.pass(3));
+    rig.line.gap.running = false;
+    assert!(rig.pass(1) && rig.line.gap.running);
+    assert!(!rig.pass(3), "a repair is reported once");
 }
 
 #[test]
 fn timer_that_stops_during_the_check_has_ended_a_frame() {
-    let mut bench = Bench::new();
-    bench.receive(&REQUEST);
-    bench.line.gap.stops.set(true);
-    assert!(!bench.pass(1));
+    let mut rig = Rig::new();
+    rig.receive(&REQUEST);
+    rig.line.gap.stops.set(true);
+    assert!(!rig.pass(1));
 }
 
 #[test]
 fn driver_that_is_on_without_a_reply_is_switched_off() {
-    let mut bench = Bench::new();
-    bench.line.uart.driver = true;
-    assert!(bench.pass(1) && !bench.line.uart.driver);
+    let mut rig = Rig::new();
+    rig.line.uart.driver = true;
+    assert!(rig.pass(1) && !rig.line.uart.driver);
 }
 
 #[test]
 fn event_that_is_pending_for_two_milliseconds_without_its_interrupt_is_a_fault() {
-    let mut bench = Bench::new();
-    bench.receive(&REQUEST);
+    let mut rig = Rig::new();
+    rig.receive(&REQUEST);
     for _ in 0..3 {
-        bench.line.gap.passed = Some(Silence::T15);
-        assert!(
-            !bench.pass(1),
-            "the interrupt runs between two milliseconds"
-        );
-        bench.line.on_gap(0);
+        rig.line.gap.passed = Some(Silence::T15);
+        assert!(!rig.pass(1), "the interrupt runs between two milliseconds");
+        rig.line.on_gap(0);
     }
-    bench.line.gap.passed = Some(Silence::T35);
-    assert!(!bench.pass(1));
-    assert!(bench.pass(1));
-    assert!(!bench.pass(3));
+    rig.line.gap.passed = Some(Silence::T35);
+    assert!(!rig.pass(1));
+    assert!(rig.pass(1));
+    assert!(!rig.pass(3));
 }
 
 #[test]
 fn reply_that_does_not_end_is_aborted() {
-    let mut bench = Bench::new();
-    bench.receive(&REQUEST);
-    assert!(bench.silence(Silence::T35));
-    bench.serve();
-    assert!(!bench.pass(LONGEST_MS - 1) && bench.line.uart.driver);
-    assert!(bench.pass(1) && !bench.line.uart.driver);
+    let mut rig = Rig::new();
+    rig.receive(&REQUEST);
+    assert!(rig.silence(Silence::T35));
+    rig.serve();
+    assert!(!rig.pass(LONGEST_MS - 1) && rig.line.uart.driver);
+    assert!(rig.pass(1) && !rig.line.uart.driver);
 
-    let mut bench = Bench::new();
-    bench.receive(&REQUEST);
-    assert!(bench.silence(Silence::T35));
-    bench.serve();
-    bench.line.on_alarm();
-    assert!(bench.line.uart.driver, "the limit has not been reached");
-    bench.line.gap.alarms.limit = true;
-    bench.line.on_alarm();
-    assert!(!bench.line.uart.driver && bench.pass(1));
+    let mut rig = Rig::new();
+    rig.receive(&REQUEST);
+    assert!(rig.silence(Silence::T35));
+    rig.serve();
+    rig.line.on_alarm();
+    assert!(rig.line.uart.driver, "the limit has not been reached");
+    rig.line.gap.alarms.limit = true;
+    rig.line.on_alarm();
+    assert!(!rig.line.uart.driver && rig.pass(1));
 }
 
 #[test]
 fn interrupt_without_a_cause_is_disabled() {
-    let mut bench = Bench::new();
-    bench.line.uart.others = true;
-    bench.receive(&REQUEST[..1]);
-    assert!(bench.line.uart.others);
-    assert!(!bench.line.on_uart(|| 0));
-    assert!(!bench.line.uart.others);
-    assert!(bench.pass(1), "it is a repair");
+    let mut rig = Rig::new();
+    rig.line.uart.others = true;
+    rig.receive(&REQUEST[..1]);
+    assert!(rig.line.uart.others);
+    assert!(!rig.line.on_uart(|| 0));
+    assert!(!rig.line.uart.others);
+    assert!(rig.pass(1), "it is a repair");
 }
 
 /// Continue a scan.
 const SCAN: [u8; 5] = [0xFD, 0x46, 2, 0x53, 0x91];
 
-impl Bench {
+impl Rig {
     /// Receives a request of Fast Modbus to all units, which ends at this time.
     fn receive_scan(&mut self, ended: u32) {
         self.line.gap.now = ended;
@@ -371,31 +368,31 @@ impl Bench {
 #[test]
 fn unit_that_serves_a_request_too_late_for_its_first_window_is_silent() {
     for (late_ms, takes_part) in [(0, true), (1, true), (2, false), (400, false)] {
-        let mut bench = Bench::new();
-        bench.receive_scan(0);
-        bench.pass(late_ms);
+        let mut rig = Rig::new();
+        rig.receive_scan(0);
+        rig.pass(late_ms);
         // The timer has wrapped, and does not show it.
-        bench.line.gap.now = 500;
-        let request = bench.line.take().expect("a request waits");
-        bench.serve_scan(request);
-        assert_eq!(bench.line.is_replying(), takes_part, "{late_ms} ms");
+        rig.line.gap.now = 500;
+        let request = rig.line.take().expect("a request waits");
+        rig.serve_scan(request);
+        assert_eq!(rig.line.is_replying(), takes_part, "{late_ms} ms");
     }
 }
 
 #[test]
 fn request_that_comes_while_another_one_is_served_keeps_its_own_time() {
-    let mut bench = Bench::new();
-    bench.receive_scan(0);
-    let request = bench.line.take().expect("a request waits");
-    bench.receive_scan(5_000);
-    bench.serve_scan(request);
-    assert!(!bench.line.is_replying());
-    bench.line.gap.now = 5_300;
-    let request = bench.line.take().expect("another request waits");
-    bench.serve_scan(request);
-    assert!(bench.line.is_replying());
+    let mut rig = Rig::new();
+    rig.receive_scan(0);
+    let request = rig.line.take().expect("a request waits");
+    rig.receive_scan(5_000);
+    rig.serve_scan(request);
+    assert!(!rig.line.is_replying());
+    rig.line.gap.now = 5_300;
+    let request = rig.line.take().expect("another request waits");
+    rig.serve_scan(request);
+    assert!(rig.line.is_replying());
     let first = 5_000 + WINDOWS.start;
-    let wake = bench.line.gap.wake;
+    let wake = rig.line.gap.wake;
     assert!((first..=first + WINDOWS.length).contains(&wake), "{wake}");
 }
 

@@ -38,12 +38,12 @@ const TIMEOUT: (u16, u32) = (36_000, 3_600_000);
 const RESETS: [u8; 2] = [0b11_0000, 0b10_1000];
 
 /// A device and its server.
-struct Bench {
+struct Rig {
     device: &'static mut Device<Modio08>,
     server: Server,
 }
 
-impl Bench {
+impl Rig {
     /// Starts a device with these settings after a reset with these flags.
     fn new(reset_cause: u8, settings: &[(u16, u16)]) -> Self {
         let mut pairs: Vec<_> = at::modules(MODULES).collect();
@@ -99,7 +99,7 @@ impl Bench {
 
 /// A unit with one output and its links.
 struct Unit {
-    bench: Bench,
+    rig: Rig,
     links: [[u16; 4]; 2],
     start: u16,
     safe: u16,
@@ -136,7 +136,7 @@ impl Unit {
         }
         let raw = &setup["raw"];
         let mut unit = Self {
-            bench: Bench::new(RESETS[0], &[]),
+            rig: Rig::new(RESETS[0], &[]),
             links,
             start: setup["start"].as_bool().unwrap_or_default().into(),
             safe: setup.get("safe").map_or(0, safe_of),
@@ -171,8 +171,8 @@ impl Unit {
             settings.extend((links::of_point(OUTPUT, second)..).zip(words));
         }
         let cause = RESETS[usize::from(kept.is_some())];
-        self.bench = Bench::new(cause, &settings);
-        self.bench.device.start_outputs(kept, None);
+        self.rig = Rig::new(cause, &settings);
+        self.rig.device.start_outputs(kept, None);
         (self.tripped, self.now) = (false, 0);
     }
 
@@ -184,9 +184,9 @@ impl Unit {
             "good" => self.good = event[1].as_bool().unwrap(),
             "trip" if !self.tripped => {
                 self.tripped = true;
-                let now = self.bench.device.state.millis();
+                let now = self.rig.device.state.millis();
                 let long_ago = now.wrapping_sub(TIMEOUT.1);
-                self.bench.device.request_seen(long_ago, true);
+                self.rig.device.request_seen(long_ago, true);
             }
             "trip" => {}
             "restart" => {
@@ -199,25 +199,25 @@ impl Unit {
     }
 
     fn request(&mut self, name: &str, event: &[Value]) {
-        let bench = &mut self.bench;
+        let rig = &mut self.rig;
         match name {
             "master" => {
                 let high = if event[1].as_bool().unwrap() { 0xFF } else { 0 };
-                bench.ask(&[5, 0, OUTPUT as u8, high, 0]);
+                rig.ask(&[5, 0, OUTPUT as u8, high, 0]);
             }
-            "request" => bench.ask(&[7]),
+            "request" => rig.ask(&[7]),
             "link" => {
                 let index = event[1].as_u64().unwrap() as usize;
                 self.links[index] = registers(&event[2]);
-                bench.write(links::of_point(OUTPUT, index == 1), &self.links[index]);
+                rig.write(links::of_point(OUTPUT, index == 1), &self.links[index]);
             }
             "setting" => {
                 self.filter ^= 1;
-                bench.write(at::FILTER + ANALOG, &[self.filter]);
+                rig.write(at::FILTER + ANALOG, &[self.filter]);
             }
             "safe" => {
                 self.safe = safe_of(&event[1]);
-                bench.write(at::SAFE + OUTPUT, &[self.safe]);
+                rig.write(at::SAFE + OUTPUT, &[self.safe]);
             }
             _ => panic!("{name}"),
         }
@@ -227,22 +227,22 @@ impl Unit {
     /// Returns what the region that a reset keeps has of the outputs.
     fn kept(&self) -> KeptOutputs {
         let mut values = [0; 32];
-        for (slot, port) in self.bench.device.points.ports().iter().enumerate() {
+        for (slot, port) in self.rig.device.points.ports().iter().enumerate() {
             for channel in 0..4 {
                 values[slot * 4 + channel] = half_word_of(port.commanded(channel));
             }
         }
         KeptOutputs {
             values,
-            modules: self.bench.device.modules_in_force(),
-            held: self.bench.device.held_outputs(),
-            at_safe: self.bench.device.outputs_at_safe(),
+            modules: self.rig.device.modules_in_force(),
+            held: self.rig.device.held_outputs(),
+            at_safe: self.rig.device.outputs_at_safe(),
         }
     }
 
     /// Scans the inputs, and returns the output as the next scan drives it.
     fn scan(&mut self) -> bool {
-        let device = &mut self.bench.device;
+        let device = &mut self.rig.device;
         let mut channels = Channels::new();
         channels.set_bit(0, self.raw.0);
         channels.set_word(0, self.raw.1.cast_unsigned());

@@ -21,7 +21,7 @@ const BUFFER: u32 = OUT + 0x100;
 
 /// Something at every pin that these tests use.
 #[derive(Default)]
-struct Bench {
+struct Rig {
     now: Time,
     /// Characters to the part.
     input: Wave,
@@ -35,7 +35,7 @@ struct Bench {
     tx: Option<Pin>,
 }
 
-impl Circuit for Bench {
+impl Circuit for Rig {
     fn drive(&self, pins: &mut Pins) {
         if self.tx.is_some() {
             return;
@@ -63,7 +63,7 @@ impl Circuit for Bench {
     }
 }
 
-impl Wire for Bench {
+impl Wire for Rig {
     fn sent(&mut self, sent: Sent) {
         if let Sent::Character(character) = sent {
             self.sent.push(character.start);
@@ -99,25 +99,25 @@ impl Wire for Bench {
     }
 }
 
-fn run(program: Asm, bench: Bench) -> Chip<Bench> {
-    run_on(&STM32F103VC, program, bench)
+fn run(program: Asm, rig: Rig) -> Chip<Rig> {
+    run_on(&STM32F103VC, program, rig)
 }
 
-fn run_on(part: &'static Part, program: Asm, bench: Bench) -> Chip<Bench> {
+fn run_on(part: &'static Part, program: Asm, rig: Rig) -> Chip<Rig> {
     let config = chip::Config {
         part,
         ..chip::Config::default()
     };
-    let mut chip = Chip::in_circuit(&program.image(), config, bench).expect("the program fits");
+    let mut chip = Chip::in_circuit(&program.image(), config, rig).expect("the program fits");
     chip.run_until(Time::from_ms(10));
     chip
 }
 
-fn out(chip: &Chip<Bench>, n: u32) -> u32 {
+fn out(chip: &Chip<Rig>, n: u32) -> u32 {
     chip.word(OUT + 4 * n).expect("in SRAM")
 }
 
-fn findings(chip: &Chip<Bench>) -> Vec<String> {
+fn findings(chip: &Chip<Rig>) -> Vec<String> {
     chip.findings().iter().map(|f| f.what.to_string()).collect()
 }
 
@@ -171,15 +171,15 @@ fn uart4_receives_by_channel_3_of_dma2_and_reports_the_idle_line() {
     program.store(UART4 + 0x14, 1 << 6);
     program.store(UART4 + 0x0C, 0x201C);
     program.spin();
-    let mut bench = Bench::default();
+    let mut rig = Rig::default();
     let mut at = Time::from_ms(4);
     for byte in *b"OK!" {
         let character = Character::new(LINE, byte).at(at);
-        bench.input.push_character(&character);
+        rig.input.push_character(&character);
         at = character.end();
     }
-    bench.input.push(at, true);
-    let mut chip = run(program, bench);
+    rig.input.push(at, true);
+    let mut chip = run(program, rig);
     chip.run_until(Time::from_ms(12));
     assert_eq!(findings(&chip), [""; 0]);
     let received = chip.word(BUFFER).expect("in SRAM").to_le_bytes();
@@ -201,7 +201,7 @@ fn uart4_sends_by_channel_5_of_dma2_without_a_gap() {
     program.store(UART4 + 0x14, 1 << 7);
     program.store(DMA2 + 0x58, 0x93);
     program.spin();
-    let chip = run(program, Bench::default());
+    let chip = run(program, Rig::default());
     assert_eq!(findings(&chip), [""; 0]);
     let sent = &chip.circuit().sent;
     assert_eq!(sent.len(), 3);
@@ -239,7 +239,7 @@ fn continuous_scan_of_the_adc_fills_a_buffer_by_channel_1_of_dma1() {
     }
     program.store(ADC1 + 0x08, on | 1 << 22);
     program.spin();
-    let chip = run(program, Bench::default());
+    let chip = run(program, Rig::default());
     assert_eq!(findings(&chip), [""; 0]);
     let codes = [0, 4].map(|at| chip.word(BUFFER + at).expect("in SRAM"));
     // 825 mV of 3300 mV, and 1430 mV of the temperature sensor.
@@ -260,10 +260,10 @@ fn edge_at_a_pin_of_port_e_requests_the_interrupt_of_its_line() {
     });
     program.copy(GPIOE + 8, OUT + 4);
     program.spin();
-    let mut chip = run(program, Bench::default());
+    let mut chip = run(program, Rig::default());
     assert_eq!((out(&chip, 0), out(&chip, 1)), (0, 1 << 15));
     for pressed in [true, false, true] {
-        chip.change(|bench| bench.button = pressed);
+        chip.change(|rig| rig.button = pressed);
         chip.run_for(Time::from_ms(1));
     }
     assert_eq!(out(&chip, 0), 2);
@@ -279,7 +279,7 @@ fn dac_output_reaches_the_circuit_at_an_analog_pin() {
     program.store(DAC, 0x0003);
     program.store(DAC + 0x08, 1000);
     program.spin();
-    let chip = run(program, Bench::default());
+    let chip = run(program, Rig::default());
     assert_eq!(chip.circuit().dac, [Some(805), None]);
     assert_eq!(findings(&chip), [""; 0]);
     // Channel 2 is on while PA5 is a digital input.
@@ -287,7 +287,7 @@ fn dac_output_reaches_the_circuit_at_an_analog_pin() {
     program.store(RCC_APB1ENR, 1 << 29);
     program.store(DAC, 1 << 16);
     program.spin();
-    let chip = run(program, Bench::default());
+    let chip = run(program, Rig::default());
     assert!(findings(&chip)[0].contains("its pin is not analog"));
 }
 
@@ -305,7 +305,7 @@ fn pin_of_swclk_is_an_output_only_while_mapr_has_the_debug_port_off() {
             program.copy(AFIO + 4, AFIO + 4);
         }
         program.spin();
-        let chip = run(program, Bench::default());
+        let chip = run(program, Rig::default());
         assert_eq!(findings(&chip), [""; 0]);
         !chip.circuit().debug
     };
@@ -349,16 +349,16 @@ fn remapped(n: usize, mapr: u32, rx: Pin) -> Asm {
 }
 
 /// Runs [`remapped`] with a wire at `tx` and the pin behind it, and sends a byte to the part.
-fn run_remapped(part: &'static Part, n: usize, mapr: u32, tx: Pin) -> Chip<Bench> {
+fn run_remapped(part: &'static Part, n: usize, mapr: u32, tx: Pin) -> Chip<Rig> {
     let rx = Pin::new(tx.port(), tx.number() + 1);
-    let mut bench = Bench {
+    let mut rig = Rig {
         tx: Some(tx),
-        ..Bench::default()
+        ..Rig::default()
     };
     let character = Character::new(LINE, b'?').at(Time::from_ms(7));
-    bench.input.push_character(&character);
-    bench.input.push(character.end(), true);
-    run_on(part, remapped(n, mapr, rx), bench)
+    rig.input.push_character(&character);
+    rig.input.push(character.end(), true);
+    run_on(part, remapped(n, mapr, rx), rig)
 }
 
 #[test]
@@ -383,13 +383,13 @@ fn remapped_usart_sends_and_receives_at_its_new_pins_and_not_at_the_old_ones() {
 
 #[test]
 fn receiver_whose_pin_is_an_output_is_reported() {
-    let bench = Bench {
+    let rig = Rig {
         tx: Some(Pin::new('A', 9)),
-        ..Bench::default()
+        ..Rig::default()
     };
     let program = remapped(1, 4 << 24, Pin::new('A', 0));
     let text = "USART1 receives, but its RX pin is not a digital input";
-    assert!(findings(&run_on(&STM32F103VC, program, bench)).contains(&text.to_owned()));
+    assert!(findings(&run_on(&STM32F103VC, program, rig)).contains(&text.to_owned()));
 }
 
 #[test]
@@ -407,11 +407,11 @@ fn remap_to_missing_pins_and_remap_of_a_timer_are_findings() {
         program.store(AFIO + 4, mapr);
         program.copy(AFIO + 4, OUT);
         program.spin();
-        let bench = Bench {
+        let rig = Rig {
             tx: Some(at),
-            ..Bench::default()
+            ..Rig::default()
         };
-        let found = findings(&run_on(part, program, bench));
+        let found = findings(&run_on(part, program, rig));
         assert_eq!(found.len(), 1, "{} {mapr:#x}: {found:?}", part.name);
         assert!(
             found[0].contains(what),
@@ -433,7 +433,7 @@ fn uart4_has_no_pins_while_usart3_is_at_them() {
         program.wait_set(UART4, 1 << 6);
     }
     program.spin();
-    let chip = run(program, Bench::default());
+    let chip = run(program, Rig::default());
     assert_eq!(chip.circuit().sent.len(), 2);
     let findings = findings(&chip);
     assert!(!findings.is_empty());

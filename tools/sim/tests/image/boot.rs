@@ -5,13 +5,13 @@ use register_map::part::FLASH_BASE;
 use sim::{Config, Module, Time};
 
 use crate::LAYOUT;
-use crate::bench::{Bench, FIRST, PORT, START, config, corner, on_crystal, symbol};
+use crate::rig::{FIRST, PORT, Rig, START, config, corner, on_crystal, symbol};
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn log_reports_module_line_settings_reset_cause_and_unit_address() {
-    let mut bench = Bench::new(Module::Do4, 17);
-    let log = bench.board.take_log();
+    let mut rig = Rig::new(Module::Do4, 17);
+    let log = rig.board.take_log();
     let slot = format!("slot {PORT}: 4do");
     for line in [
         "modio ",
@@ -30,18 +30,18 @@ fn unit_reports_the_commit_that_it_was_built_from() {
     let commit = register_map::commit!().get(..8).unwrap_or_default();
     // Outside a repository the commit is not known.
     let commit = u32::from_str_radix(commit, 16).unwrap_or_default();
-    let mut bench = Bench::new(Module::Do4, 1);
-    let words = [0x020C, 0x020D].map(|address| u32::from(bench.register(address)));
+    let mut rig = Rig::new(Module::Do4, 1);
+    let words = [0x020C, 0x020D].map(|address| u32::from(rig.register(address)));
     assert_eq!(words, [commit >> 16, commit & 0xFFFF]);
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn unit_answers_within_170_milliseconds_of_power_on() {
-    let mut bench = Bench::cold(config(Module::Di4, &[]));
+    let mut rig = Rig::cold(config(Module::Di4, &[]));
     // The request takes 9 ms, and t3.5 4 ms.
-    bench.board.run_for(Time::from_ms(156));
-    bench.assert_answers(1);
+    rig.board.run_for(Time::from_ms(156));
+    rig.assert_answers(1);
 }
 
 #[test]
@@ -49,15 +49,15 @@ fn unit_answers_within_170_milliseconds_of_power_on() {
 fn without_a_crystal_the_unit_logs_it_and_runs_on_the_internal_oscillator() {
     let mut config = config(Module::Di4, &[]);
     config.chip.crystal = false;
-    let mut bench = Bench::with(config);
-    bench.board.run_for(Time::from_ms(500));
-    bench.assert_answers(1);
-    let log = bench.board.take_log();
+    let mut rig = Rig::with(config);
+    rig.board.run_for(Time::from_ms(500));
+    rig.assert_answers(1);
+    let log = rig.board.take_log();
     assert!(log.contains("crystal did not start"), "{log}");
-    bench.board.watch_pin('B', 9);
-    bench.board.run_for(Time::from_secs(4));
+    rig.board.watch_pin('B', 9);
+    rig.board.run_for(Time::from_secs(4));
     assert_eq!(
-        bench.board.pin_edges('B', 9).len(),
+        rig.board.pin_edges('B', 9).len(),
         4,
         "a flash every two seconds"
     );
@@ -66,44 +66,44 @@ fn without_a_crystal_the_unit_logs_it_and_runs_on_the_internal_oscillator() {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn the_run_led_blinks_and_the_watchdog_does_not_reset() {
-    let mut bench = Bench::new(Module::Di4, 1);
-    bench.board.watch_pin('C', 13);
-    bench.board.run_for(Time::from_secs(10));
-    let edges = bench.board.pin_edges('C', 13).len();
+    let mut rig = Rig::new(Module::Di4, 1);
+    rig.board.watch_pin('C', 13);
+    rig.board.run_for(Time::from_secs(10));
+    let edges = rig.board.pin_edges('C', 13).len();
     assert!((19..=21).contains(&edges), "{edges} edges in ten seconds");
-    assert_eq!(bench.board.resets(), 0);
+    assert_eq!(rig.board.resets(), 0);
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn a_request_lights_the_activity_led() {
-    let mut bench = Bench::new(Module::Di4, 1);
-    bench.board.run_for(Time::from_ms(200));
-    assert!(!bench.board.leds().activity);
+    let mut rig = Rig::new(Module::Di4, 1);
+    rig.board.run_for(Time::from_ms(200));
+    assert!(!rig.board.leds().activity);
     // A request to another unit does not light the LED.
-    bench.ask(2, &[1, 0, FIRST, 0, 4]);
-    assert!(!bench.board.leds().activity);
-    bench.assert_answers(1);
-    assert!(bench.board.leds().activity);
-    bench.board.run_for(Time::from_ms(200));
-    assert!(!bench.board.leds().activity);
+    rig.ask(2, &[1, 0, FIRST, 0, 4]);
+    assert!(!rig.board.leds().activity);
+    rig.assert_answers(1);
+    assert!(rig.board.leds().activity);
+    rig.board.run_for(Time::from_ms(200));
+    assert!(!rig.board.leds().activity);
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn identify_makes_all_leds_blink_and_then_ends() {
-    let mut bench = Bench::set_up(Module::Di4, &[]);
-    bench.command(6);
-    bench.board.run_for(Time::from_ms(200));
+    let mut rig = Rig::set_up(Module::Di4, &[]);
+    rig.command(6);
+    rig.board.run_for(Time::from_ms(200));
     let all_lit = (0..20).filter(|_| {
-        bench.board.run_for(Time::from_ms(50));
-        let leds = bench.board.leds();
+        rig.board.run_for(Time::from_ms(50));
+        let leds = rig.board.leds();
         leds.activity && leds.fault && leds.run
     });
     let all_lit = all_lit.count();
     assert!((8..=12).contains(&all_lit), "{all_lit} of 20 times 50 ms");
-    bench.board.run_for(Time::from_secs(10));
-    assert!(!bench.board.leds().fault);
+    rig.board.run_for(Time::from_secs(10));
+    assert!(!rig.board.leds().fault);
 }
 
 /// Code that leaves the crystal and the PLL running, as another loader may, and branches to the application: HSE on, the
@@ -139,17 +139,14 @@ fn boot_loader(entry: u32) -> Vec<u8> {
 #[ignore = "needs the image: cargo xtask test"]
 fn image_entered_with_the_pll_running_waits_until_the_pll_has_stopped() {
     const LOADER: u32 = 0x2000_4800;
-    let mut bench = Bench::cold(config(Module::Di4, &[]));
+    let mut rig = Rig::cold(config(Module::Di4, &[]));
     let entry = symbol("Reset") & !1;
-    assert!(bench.board.run_until_pc(entry, START));
-    bench
-        .board
-        .write_memory(LOADER, &boot_loader(entry))
-        .unwrap();
-    bench.board.set_register(15, LOADER).unwrap();
-    bench.board.run_for(START);
-    assert_eq!(bench.board.hclk(), on_crystal(72_000_000));
-    bench.assert_answers(1);
+    assert!(rig.board.run_until_pc(entry, START));
+    rig.board.write_memory(LOADER, &boot_loader(entry)).unwrap();
+    rig.board.set_register(15, LOADER).unwrap();
+    rig.board.run_for(START);
+    assert_eq!(rig.board.hclk(), on_crystal(72_000_000));
+    rig.assert_answers(1);
 }
 
 /// Returns the real duration of a watchdog time given for an LSI of 40 kHz.
@@ -160,7 +157,7 @@ fn lsi_ms(milliseconds: u64) -> Time {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn start_that_hangs_is_reset_by_the_watchdog() {
-    let cold = || Bench::cold(config(Module::Di4, &[]));
+    let cold = || Rig::cold(config(Module::Di4, &[]));
     // When the clock changes, the crystal has just started. Before that the stack has been painted and the watchdog has
     // its settings.
     let mut rehearsal = cold();
@@ -168,26 +165,25 @@ fn start_that_hangs_is_reset_by_the_watchdog() {
     while rehearsal.board.hclk() == first_clock {
         rehearsal.board.run_for(Time::from_us(50));
     }
-    let mut bench = cold();
-    bench.tolerant = true;
-    bench
-        .board
+    let mut rig = cold();
+    rig.tolerant = true;
+    rig.board
         .run_until(rehearsal.board.now() - Time::from_us(300));
-    let (hung, from) = (bench.board.pc(), bench.board.now());
+    let (hung, from) = (rig.board.pc(), rig.board.now());
     let at = (hung - 0x0800_0000) as usize;
-    let was = bench.board.flash()[at..at + 2].to_vec();
-    bench.board.patch_code(hung, &[0xFE, 0xE7]).unwrap();
-    while bench.board.resets() == 0 {
-        bench.board.run_for(Time::from_ms(1));
-        let hangs = bench.board.now() - from;
+    let was = rig.board.flash()[at..at + 2].to_vec();
+    rig.board.patch_code(hung, &[0xFE, 0xE7]).unwrap();
+    while rig.board.resets() == 0 {
+        rig.board.run_for(Time::from_ms(1));
+        let hangs = rig.board.now() - from;
         assert!(hangs < lsi_ms(2_100), "the watchdog did not reset the unit");
     }
-    assert!(bench.board.now() - from > lsi_ms(1_800));
-    bench.board.patch_code(hung, &was).unwrap();
-    bench.started();
-    assert_eq!(bench.board.resets(), 1);
+    assert!(rig.board.now() - from > lsi_ms(1_800));
+    rig.board.patch_code(hung, &was).unwrap();
+    rig.started();
+    assert_eq!(rig.board.resets(), 1);
     assert_eq!(
-        bench.register(0x0207) & 4,
+        rig.register(0x0207) & 4,
         4,
         "the reset cause is the watchdog"
     );
@@ -198,8 +194,8 @@ fn start_that_hangs_is_reset_by_the_watchdog() {
 #[ignore = "needs the image: cargo xtask test"]
 fn second_beat_is_a_millisecond_after_the_first() {
     const TIM4: usize = 16 + 30;
-    let mut bench = Bench::cold(Config::default());
-    let board = &mut bench.board;
+    let mut rig = Rig::cold(Config::default());
+    let board = &mut rig.board;
     let vectors = (LAYOUT.board.layout().slots[0] + HEADER - FLASH_BASE) as usize;
     let vector = board.flash()[vectors + 4 * TIM4..].first_chunk();
     let handler = u32::from_le_bytes(*vector.expect("a vector"));

@@ -3,7 +3,7 @@
 use sim::line::Received;
 use sim::{Board, Bus, Config, Module, Time};
 
-use crate::bench::{self, FIRST, START, adu, config, corner};
+use crate::rig::{self, FIRST, START, adu, config, corner};
 
 /// Returns boards with these switches on one bus, with time to start.
 fn bus(dips: impl IntoIterator<Item = u8>) -> Bus {
@@ -19,7 +19,7 @@ fn board(dip: u8) -> Board {
         ..config(Module::Di4, &[])
     };
     config.chip.corner = corner();
-    bench::board(config)
+    rig::board(config)
 }
 
 /// Sends these bytes now, waits 50 ms after their end, and returns what the master has received.

@@ -8,8 +8,8 @@ use sim::line::Settings;
 use sim::{Board, Bus, Module, Time};
 
 use crate::LAYOUT;
-use crate::bench::{FIRST, adu, file};
 use crate::in_slots::{CHECK, START, flash, image, made};
+use crate::rig::{FIRST, adu, file};
 
 /// Returns the flash of a board with an image in slot A alone, a 4DI and this rate.
 pub fn stored(baud: Baud) -> Vec<u8> {

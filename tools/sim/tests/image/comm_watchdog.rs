@@ -6,11 +6,11 @@ use sim::{Channel, Module, Time};
 
 use crate::{
     analog_outputs::codes,
-    bench::{Bench, FIRST, SLOT, ascii},
+    rig::{FIRST, Rig, SLOT, ascii},
 };
 
-fn outputs(bench: &Bench) -> [bool; 4] {
-    [1, 2, 3, 4].map(|n| match bench.board.channel(n) {
+fn outputs(rig: &Rig) -> [bool; 4] {
+    [1, 2, 3, 4].map(|n| match rig.board.channel(n) {
         Channel::Do { on } => on,
         other => panic!("channel {n} is {other:?}"),
     })
@@ -29,36 +29,35 @@ fn assert_on_time(from: Time, tenths: u16, at: Time) {
 }
 
 /// Sets a time-out in units of 100 ms and switches all outputs on.
-fn armed(bench: &mut Bench, tenths: u16) {
-    bench.configure(COMM_TIMEOUT, &[tenths]);
-    bench.write_bits(SLOT, &[true; 4]).unwrap();
+fn armed(rig: &mut Rig, tenths: u16) {
+    rig.configure(COMM_TIMEOUT, &[tenths]);
+    rig.write_bits(SLOT, &[true; 4]).unwrap();
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn digital_outputs_go_to_safe_two_milliseconds_around_the_time_out_at_any_rate() {
     for (baud, format) in [(96, 0), (1152, 1), (12, 0)] {
-        let mut bench = Bench::set_up(Module::Do4, &[(0x0101, baud), (0x0102, format)]);
+        let mut rig = Rig::set_up(Module::Do4, &[(0x0101, baud), (0x0102, format)]);
         // At 1200 bit/s a request and its reply take longer than the shortest time-out.
         let more = if baud == 12 { 2 } else { 0 };
         for (n, tenths) in (0..).zip([1, 2, 3, 7, 10, 1, 5, 1, 20, 1]) {
             let tenths = tenths + more;
-            armed(&mut bench, tenths);
+            armed(&mut rig, tenths);
             // At any phase between two scans.
-            bench.board.run_for(Time::from_us(n * 137));
-            bench.board.watch_pin('A', 3);
-            assert_eq!(bench.bits(1, SLOT, 4), Ok(vec![true; 4]));
-            let last = bench.sent;
-            bench
-                .board
+            rig.board.run_for(Time::from_us(n * 137));
+            rig.board.watch_pin('A', 3);
+            assert_eq!(rig.bits(1, SLOT, 4), Ok(vec![true; 4]));
+            let last = rig.sent;
+            rig.board
                 .run_for(Time::from_ms(100 * u64::from(tenths) + 50));
-            let edges = bench.board.pin_edges('A', 3);
+            let edges = rig.board.pin_edges('A', 3);
             let &[.., (at, false)] = edges else {
                 panic!("the output did not go off: {edges:?}");
             };
             assert!(at > last);
             assert_on_time(last, tenths, at);
-            assert_eq!(outputs(&bench), [false; 4]);
+            assert_eq!(outputs(&rig), [false; 4]);
         }
     }
 }
@@ -68,35 +67,33 @@ fn digital_outputs_go_to_safe_two_milliseconds_around_the_time_out_at_any_rate()
 fn analog_outputs_go_to_safe_two_milliseconds_around_the_time_out() {
     let safe = [4095, 0, HOLD, 1234];
     let stored: Vec<_> = (0..).zip(safe).map(|(n, v)| (SAFE + SLOT + n, v)).collect();
-    let mut bench = Bench::set_up(Module::Ao4, &stored);
+    let mut rig = Rig::set_up(Module::Ao4, &stored);
     for (n, tenths) in (0..).zip([1, 2, 1, 3, 1, 10, 1, 1, 2, 1]) {
-        bench.configure(COMM_TIMEOUT, &[tenths]);
-        bench.board.run_for(Time::from_us(n * 1_370));
-        bench.write(SLOT, &[1, 2, 3, 4]).unwrap();
-        let last = bench.sent;
-        bench.board.run_for(Time::from_ms(30));
-        assert_eq!(codes(&bench, [1, 2, 3, 4]), [1, 2, 3, 4]);
-        bench
-            .board
+        rig.configure(COMM_TIMEOUT, &[tenths]);
+        rig.board.run_for(Time::from_us(n * 1_370));
+        rig.write(SLOT, &[1, 2, 3, 4]).unwrap();
+        let last = rig.sent;
+        rig.board.run_for(Time::from_ms(30));
+        assert_eq!(codes(&rig, [1, 2, 3, 4]), [1, 2, 3, 4]);
+        rig.board
             .run_until(last + Time::from_ms(100 * u64::from(tenths) - 10));
         // Each of the four channels on its own: the DAC receives them one after another.
         let (mut first, mut all) = (None, None);
-        while all.is_none()
-            && bench.board.now() < last + Time::from_ms(100 * u64::from(tenths) + 50)
+        while all.is_none() && rig.board.now() < last + Time::from_ms(100 * u64::from(tenths) + 50)
         {
-            bench.board.run_for(Time::from_us(50));
-            let now = codes(&bench, [1, 2, 3, 4]);
+            rig.board.run_for(Time::from_us(50));
+            let now = codes(&rig, [1, 2, 3, 4]);
             if now != [1, 2, 3, 4] && first.is_none() {
-                first = Some(bench.board.now());
+                first = Some(rig.board.now());
             }
             if now == [4095, 0, 3, 1234] {
-                all = Some(bench.board.now());
+                all = Some(rig.board.now());
             }
         }
         assert_on_time(last, tenths, first.expect("the watchdog did not trip"));
         assert_on_time(last, tenths, all.expect("not all outputs went to SAFE"));
         assert_eq!(
-            bench.registers(SLOT, 4),
+            rig.registers(SLOT, 4),
             Ok(vec![4095, 0, 3, 1234]),
             "reads return the SAFE values"
         );
@@ -107,41 +104,41 @@ fn analog_outputs_go_to_safe_two_milliseconds_around_the_time_out() {
 #[ignore = "needs the image: cargo xtask test"]
 fn watchdog_counts_from_the_end_of_an_ascii_request() {
     let settings = [(MODE, 1), (FRAME_GAP, 500), (COMM_TIMEOUT, 2)];
-    let mut bench = Bench::set_up(Module::Do4, &settings);
-    bench.patience = Time::from_ms(60);
+    let mut rig = Rig::set_up(Module::Do4, &settings);
+    rig.patience = Time::from_ms(60);
     let on = [0x05, 0, FIRST, 0xFF, 0];
     assert_eq!(
-        bench.exchange(&ascii(&on, "\r\n")),
+        rig.exchange(&ascii(&on, "\r\n")),
         ascii(&on, "\r\n"),
         "after 50 ms"
     );
     for (ms, is_on) in [(197, true), (203, false)] {
-        bench.board.run_until(bench.sent + Time::from_ms(ms));
-        assert_eq!(bench.board.channel(1), Channel::Do { on: is_on }, "{ms} ms");
+        rig.board.run_until(rig.sent + Time::from_ms(ms));
+        assert_eq!(rig.board.channel(1), Channel::Do { on: is_on }, "{ms} ms");
     }
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn outputs_go_to_safe_in_listen_only_mode() {
-    let mut bench = Bench::new(Module::Do4, 1);
-    bench.unlock();
-    bench.write(0x0104, &[2]).unwrap();
-    bench.ask(1, &[0x05, 0, FIRST, 0xFF, 0]).expect("a reply");
-    assert_eq!(bench.ask(1, &[0x08, 0, 4, 0, 0]), None);
-    assert_eq!(bench.board.channel(1), Channel::Do { on: true });
+    let mut rig = Rig::new(Module::Do4, 1);
+    rig.unlock();
+    rig.write(0x0104, &[2]).unwrap();
+    rig.ask(1, &[0x05, 0, FIRST, 0xFF, 0]).expect("a reply");
+    assert_eq!(rig.ask(1, &[0x08, 0, 4, 0, 0]), None);
+    assert_eq!(rig.board.channel(1), Channel::Do { on: true });
     for _ in 0..10 {
-        assert_eq!(bench.ask(1, &[0x05, 0, FIRST + 1, 0xFF, 0]), None);
-        bench.board.run_for(Time::from_ms(30));
+        assert_eq!(rig.ask(1, &[0x05, 0, FIRST + 1, 0xFF, 0]), None);
+        rig.board.run_for(Time::from_ms(30));
     }
-    assert_eq!(bench.board.channel(1), Channel::Do { on: false });
-    assert_eq!(bench.board.channel(2), Channel::Do { on: false });
+    assert_eq!(rig.board.channel(1), Channel::Do { on: false });
+    assert_eq!(rig.board.channel(2), Channel::Do { on: false });
     assert_eq!(
-        bench.ask(1, &[0x08, 0, 1, 0, 0]),
+        rig.ask(1, &[0x08, 0, 1, 0, 0]),
         None,
         "the restart gets no reply"
     );
     // The status is: communication lost, not saved, unlocked.
-    assert_eq!(bench.ask(1, &[0x07]), Some(vec![0x07, 0b10_1001]));
-    bench.assert_sound();
+    assert_eq!(rig.ask(1, &[0x07]), Some(vec![0x07, 0b10_1001]));
+    rig.assert_sound();
 }

@@ -4,7 +4,7 @@ use register_map::codes::Baud;
 use sim::line::Settings;
 use sim::{Board, Bus, Time};
 
-use crate::bench::{adu, crc, format};
+use crate::rig::{adu, crc, format};
 
 /// A bus with a master that knows function 70.
 pub struct Master {

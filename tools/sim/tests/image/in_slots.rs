@@ -11,7 +11,7 @@ use sim::{Board, Config, Module, Time, chip};
 
 use crate::{
     LAYOUT,
-    bench::{self, Bench, PORT, corner, file, flash_with_settings, pages},
+    rig::{self, PORT, Rig, corner, file, flash_with_settings, pages},
 };
 
 /// Offset of the application in an image, and of fields in the header.
@@ -85,7 +85,7 @@ pub fn with_crc(image: &mut [u8]) {
 }
 
 /// Returns a board just powered on, with these images in its slots, and a 4DI and these settings in its configuration.
-pub fn unit(slots: [&[u8]; 2], settings: &[(u16, u16)]) -> Bench {
+pub fn unit(slots: [&[u8]; 2], settings: &[(u16, u16)]) -> Rig {
     holding(flash(slots, Module::Di4, settings), 1)
 }
 
@@ -105,16 +105,16 @@ pub fn flash(slots: [&[u8]; 2], module: Module, settings: &[(u16, u16)]) -> Vec<
 }
 
 /// Returns a board just powered on, with these bytes in its flash, this switch and a 4DI.
-pub fn holding(flash: Vec<u8>, dip: u8) -> Bench {
+pub fn holding(flash: Vec<u8>, dip: u8) -> Rig {
     fitted(flash, Module::Di4, dip)
 }
 
 /// The same, with a module.
-pub fn fitted(flash: Vec<u8>, module: Module, dip: u8) -> Bench {
-    let mut bench = Bench::of(made(flash, module, dip));
+pub fn fitted(flash: Vec<u8>, module: Module, dip: u8) -> Rig {
+    let mut rig = Rig::of(made(flash, module, dip));
     // The loader's reset after a check.
-    bench.tolerant = true;
-    bench
+    rig.tolerant = true;
+    rig
 }
 
 /// Returns a board for a bus with several.
@@ -126,37 +126,37 @@ pub fn made(flash: Vec<u8>, module: Module, dip: u8) -> Board {
         ..Config::default()
     };
     config.chip.corner = corner();
-    bench::board(config)
+    rig::board(config)
 }
 
 /// Runs until the unit answers, and returns that time.
-pub fn answers(bench: &mut Bench, within: Time) -> Option<Time> {
-    answers_as(bench, 1, within)
+pub fn answers(rig: &mut Rig, within: Time) -> Option<Time> {
+    answers_as(rig, 1, within)
 }
 
 /// Runs until the unit answers with this address, and returns that time.
-pub fn answers_as(bench: &mut Bench, unit: u8, within: Time) -> Option<Time> {
-    let end = bench.board.now() + within;
-    while bench.board.now() < end {
-        bench.board.run_for(Time::from_ms(20));
-        if bench.ask(unit, &[3, 2, 5, 0, 1]).is_some() {
-            let module = bench.ask(unit, &[3, 2, 0x0F + PORT as u8, 0, 1]);
+pub fn answers_as(rig: &mut Rig, unit: u8, within: Time) -> Option<Time> {
+    let end = rig.board.now() + within;
+    while rig.board.now() < end {
+        rig.board.run_for(Time::from_ms(20));
+        if rig.ask(unit, &[3, 2, 5, 0, 1]).is_some() {
+            let module = rig.ask(unit, &[3, 2, 0x0F + PORT as u8, 0, 1]);
             assert_ne!(module.as_deref(), Some(&[3, 2, 0, 0][..]), "it is stored");
-            assert_eq!(bench.board.findings(), []);
-            return Some(bench.board.now());
+            assert_eq!(rig.board.findings(), []);
+            return Some(rig.board.now());
         }
     }
     None
 }
 
 /// Returns the slot whose code runs.
-pub fn runs_from(bench: &mut Bench) -> usize {
+pub fn runs_from(rig: &mut Rig) -> usize {
     let [a, b] = LAYOUT.board.layout().slots;
     // A handler may run in RAM.
-    while bench.board.pc() >= RAM {
-        bench.board.run_for(Time::from_us(1));
+    while rig.board.pc() >= RAM {
+        rig.board.run_for(Time::from_us(1));
     }
-    let pc = bench.board.pc();
+    let pc = rig.board.pc();
     assert!(pc >= a, "the loader runs");
     usize::from(pc >= b)
 }

@@ -23,18 +23,18 @@ fn the_first_genuine_image_starts_and_the_next_start_checks_no_signature() {
         ([&[], &b[..]], 1),
         ([&a[..], &b[..]], 0),
     ] {
-        let mut bench = unit(slots, &[]);
-        answers(&mut bench, CHECK + START).expect("it starts");
-        assert_eq!(runs_from(&mut bench), starts);
-        assert_eq!(bench.board.resets(), 1, "the loader's, after the check");
-        assert_eq!(bench.register(RESET_CAUSE), POWER_ON | PIN | SOFTWARE);
-        bench.board.cycle();
-        let operations = bench.board.flash_operations();
-        answers(&mut bench, START).expect("it starts again");
-        assert_eq!(bench.board.resets(), 0);
-        assert_eq!(runs_from(&mut bench), starts);
-        assert_eq!(bench.board.flash_operations(), operations);
-        assert_eq!(bench.register(RESET_CAUSE), POWER_ON | PIN);
+        let mut rig = unit(slots, &[]);
+        answers(&mut rig, CHECK + START).expect("it starts");
+        assert_eq!(runs_from(&mut rig), starts);
+        assert_eq!(rig.board.resets(), 1, "the loader's, after the check");
+        assert_eq!(rig.register(RESET_CAUSE), POWER_ON | PIN | SOFTWARE);
+        rig.board.cycle();
+        let operations = rig.board.flash_operations();
+        answers(&mut rig, START).expect("it starts again");
+        assert_eq!(rig.board.resets(), 0);
+        assert_eq!(runs_from(&mut rig), starts);
+        assert_eq!(rig.board.flash_operations(), operations);
+        assert_eq!(rig.register(RESET_CAUSE), POWER_ON | PIN);
     }
 }
 
@@ -42,15 +42,15 @@ fn the_first_genuine_image_starts_and_the_next_start_checks_no_signature() {
 #[ignore = "needs the image: cargo xtask test"]
 fn the_application_starts_within_100_ms_of_the_reset() {
     let (a, b) = (image(0), image(1));
-    let mut bench = unit([&a, &b], &[]);
-    answers(&mut bench, CHECK + START).expect("it starts");
+    let mut rig = unit([&a, &b], &[]);
+    answers(&mut rig, CHECK + START).expect("it starts");
     let [slot, _] = LAYOUT.board.layout().slots;
-    bench.board.cycle();
-    let from = bench.board.now();
-    while !(slot..RAM).contains(&bench.board.pc()) {
-        bench.board.run_for(Time::from_us(100));
+    rig.board.cycle();
+    let from = rig.board.now();
+    while !(slot..RAM).contains(&rig.board.pc()) {
+        rig.board.run_for(Time::from_us(100));
     }
-    let took = bench.board.now() - from;
+    let took = rig.board.now() - from;
     println!("the loader takes {took:?}");
     assert!(took < Time::from_ms(100), "{took:?}");
 }
@@ -91,13 +91,13 @@ fn an_image_with_anything_wrong_is_not_started() {
         ("cut short", a[..last].to_vec()),
         ("image for slot B", image(1)),
     ] {
-        let mut bench = unit([&wrong, &[]], &[]);
-        while !bench.board.leds().fault {
-            bench.board.run_for(Time::from_ms(20));
-            assert!(bench.board.now() < CHECK, "{what}");
+        let mut rig = unit([&wrong, &[]], &[]);
+        while !rig.board.leds().fault {
+            rig.board.run_for(Time::from_ms(20));
+            assert!(rig.board.now() < CHECK, "{what}");
         }
-        assert!(bench.board.pc() < LAYOUT.board.layout().slots[0], "{what}");
-        assert_eq!(bench.board.resets(), 0, "{what}");
+        assert!(rig.board.pc() < LAYOUT.board.layout().slots[0], "{what}");
+        assert_eq!(rig.board.resets(), 0, "{what}");
     }
 }
 
@@ -106,21 +106,21 @@ fn an_image_with_anything_wrong_is_not_started() {
 fn without_an_image_the_leds_say_so_and_nothing_is_driven() {
     // After the check of a signature the clocks are again those after a reset.
     let forged = changed(SIGNATURE, &[image(0)[SIGNATURE] ^ 1]);
-    let mut bench = unit([&forged, &[]], &[]);
-    bench.board.run_for(CHECK);
+    let mut rig = unit([&forged, &[]], &[]);
+    rig.board.run_for(CHECK);
     let mut blinks = 0;
-    let mut lit = bench.board.leds().run;
+    let mut lit = rig.board.leds().run;
     for _ in 0..1000 {
-        bench.board.run_for(Time::from_ms(10));
-        let leds = bench.board.leds();
+        rig.board.run_for(Time::from_ms(10));
+        let leds = rig.board.leds();
         assert!(leds.fault && !leds.activity, "{leds:?}");
         blinks += u32::from(leds.run != lit);
         lit = leds.run;
-        assert!(!bench.board.driver_enable());
+        assert!(!rig.board.driver_enable());
     }
     // On or off ten times a second for 10 s, by the internal oscillator.
     assert!((90..110).contains(&blinks), "{blinks}");
-    assert_eq!(bench.board.resets(), 0);
+    assert_eq!(rig.board.resets(), 0);
 }
 
 #[test]
@@ -130,17 +130,17 @@ fn power_cut_in_a_flash_operation_of_the_first_start_does_no_harm() {
     // The erase of a page, half-words of the record, the first of its CRC-32, and both seals. The tests of the loader's
     // journal cut every operation.
     for (n, operation) in [1, 2, 5, 8, 10, 11].into_iter().enumerate() {
-        let mut bench = unit([&a, &b], &[]);
+        let mut rig = unit([&a, &b], &[]);
         let fraction = [0.0, 0.5, 0.75, 1.0][n % 4];
-        bench.board.cut_in_flash_operation(operation, fraction);
-        bench.board.run_for(CHECK);
-        assert!(!bench.board.powered(), "{operation}");
-        bench.board.run_for(Time::from_ms(100));
-        bench.board.power_on();
+        rig.board.cut_in_flash_operation(operation, fraction);
+        rig.board.run_for(CHECK);
+        assert!(!rig.board.powered(), "{operation}");
+        rig.board.run_for(Time::from_ms(100));
+        rig.board.power_on();
         let what = format!("operation {operation}, {fraction} of it");
-        answers(&mut bench, CHECK + START).expect(&what);
-        bench.board.cycle();
-        answers(&mut bench, START).expect(&what);
-        assert_eq!(runs_from(&mut bench), 0);
+        answers(&mut rig, CHECK + START).expect(&what);
+        rig.board.cycle();
+        answers(&mut rig, START).expect(&what);
+        assert_eq!(runs_from(&mut rig), 0);
     }
 }

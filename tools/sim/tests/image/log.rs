@@ -4,27 +4,27 @@
 use sim::soc::map::Block;
 use sim::{Module, Time};
 
-use crate::bench::{Bench, symbol};
+use crate::rig::{Rig, symbol};
 
 /// Offset of channel 0's flags in RTT's control block.
 const FLAGS: u32 = 44;
 /// The mode in which a writer waits for the reader when the buffer is full.
 const BLOCK_IF_FULL: u32 = 2;
 
-fn bench() -> Bench {
-    let mut bench = Bench::new(Module::Di4, 1);
-    bench.tolerant = true;
-    bench.board.take_log();
-    bench
+fn rig() -> Rig {
+    let mut rig = Rig::new(Module::Di4, 1);
+    rig.tolerant = true;
+    rig.board.take_log();
+    rig
 }
 
 /// Disturbs the line, which the firmware then sets up again, and returns the time in the log's line about it, in
 /// milliseconds.
-fn event(bench: &mut Bench) -> u32 {
+fn event(rig: &mut Rig) -> u32 {
     // Set BRR to another rate.
-    bench.board.upset(Block::Usart1, 0x08, 0x0400);
-    bench.board.run_for(Time::from_ms(100));
-    let log = bench.board.take_log();
+    rig.board.upset(Block::Usart1, 0x08, 0x0400);
+    rig.board.run_for(Time::from_ms(100));
+    let log = rig.board.take_log();
     let time = log
         .strip_prefix('[')
         .and_then(|log| log.strip_suffix("] WARN line: set up again\n"))
@@ -37,10 +37,10 @@ fn event(bench: &mut Bench) -> u32 {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn log_line_of_an_event_has_the_time_in_milliseconds() {
-    let mut bench = bench();
-    let first = event(&mut bench);
-    bench.board.run_for(Time::from_ms(12_005));
-    let second = event(&mut bench);
+    let mut rig = rig();
+    let first = event(&mut rig);
+    rig.board.run_for(Time::from_ms(12_005));
+    let second = event(&mut rig);
     // A register of the line is compared every 24 ms, and the background, which logs, runs every 10 ms.
     assert!(
         (12_105 - 34..=12_105 + 34).contains(&(second - first)),
@@ -51,12 +51,11 @@ fn log_line_of_an_event_has_the_time_in_milliseconds() {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn log_never_waits_for_a_reader_although_a_debugger_asks_for_it() {
-    let mut bench = bench();
+    let mut rig = rig();
     let block = symbol("_SEGGER_RTT");
-    bench
-        .board
+    rig.board
         .write_memory(block + FLAGS, &BLOCK_IF_FULL.to_le_bytes())
         .unwrap();
-    event(&mut bench);
-    assert_eq!(bench.board.word(block + FLAGS), Some(0), "skip if full");
+    event(&mut rig);
+    assert_eq!(rig.board.word(block + FLAGS), Some(0), "skip if full");
 }

@@ -6,7 +6,7 @@ use std::{env, fs, time::Instant};
 
 use sim::{Module, Time};
 
-use crate::bench::{Bench, FIRST};
+use crate::rig::{FIRST, Rig};
 
 /// Environment variable with the number of hours.
 const VARIABLE: &str = "MODIO_SOAK_HOURS";
@@ -20,8 +20,8 @@ const GROWTH: u64 = 1024;
 const UPTIME: u8 = 0x08;
 const FREE_STACK: u8 = 0x0B;
 
-fn read(bench: &mut Bench, register: u8, count: u8) -> u32 {
-    let reply = bench.ask(1, &[3, 2, register, 0, count]);
+fn read(rig: &mut Rig, register: u8, count: u8) -> u32 {
+    let reply = rig.ask(1, &[3, 2, register, 0, count]);
     let reply = reply.expect("an answer");
     let words = reply[2..].chunks(2);
     words.fold(0, |value, word| {
@@ -45,17 +45,17 @@ fn an_input_changes_and_is_read_every_second_for_hours() {
         .ok()
         .map(|hours| hours.parse().expect(VARIABLE));
     let seconds = hours.map_or(SECONDS, |hours| (hours * 3600.0) as u64);
-    let mut bench = Bench::new(Module::Di4, 1);
+    let mut rig = Rig::new(Module::Di4, 1);
     let begin = Instant::now();
     let mut early = (0, None);
     for second in 1..=seconds {
         let on = second % 2 == 0;
-        bench.board.set_energised(1, on).unwrap();
-        bench.board.run_until(Time::from_secs(second));
-        let reply = bench.ask(1, &[2, 0, FIRST, 0, 4]);
+        rig.board.set_energised(1, on).unwrap();
+        rig.board.run_until(Time::from_secs(second));
+        let reply = rig.ask(1, &[2, 0, FIRST, 0, 4]);
         assert_eq!(reply, Some(vec![2, 1, u8::from(on)]), "second {second}");
         if second == seconds.div_ceil(2) {
-            early = (read(&mut bench, FREE_STACK, 1), memory());
+            early = (read(&mut rig, FREE_STACK, 1), memory());
         }
         if hours.is_some() && second % 3600 == 0 {
             let passed = begin.elapsed().as_secs();
@@ -66,12 +66,12 @@ fn an_input_changes_and_is_read_every_second_for_hours() {
             );
         }
     }
-    let uptime = u64::from(read(&mut bench, UPTIME, 2));
+    let uptime = u64::from(read(&mut rig, UPTIME, 2));
     // The crystal may be 100 ppm off.
     let off = uptime.abs_diff(seconds);
     assert!(off <= 1 + seconds / 10_000, "{uptime} s of {seconds} s");
     assert_eq!(
-        read(&mut bench, FREE_STACK, 1),
+        read(&mut rig, FREE_STACK, 1),
         early.0,
         "bytes of free stack"
     );

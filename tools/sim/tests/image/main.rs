@@ -6,11 +6,11 @@
 //!
 //! The board is a modio-02, as after the first start of its loader. `MODIO_IMAGES_MODIO_02`, which `cargo xtask test` sets,
 //! names the directory of loader and images. The tests of the modio-08's image are in `tests/image_08`; they use most of
-//! the files here as well, which name the board's first slot by [`bench::PORT`], [`bench::SLOT`] and [`bench::MODULE`].
+//! the files here as well, which name the board's first slot by [`rig::PORT`], [`rig::SLOT`] and [`rig::MODULE`].
 //!
 //! | what | where |
 //! |---|---|
-//! | a board and its master | `bench`, `registers` |
+//! | a board and its master | `rig`, `registers` |
 //! | the description | `self_description` |
 //! | the line | `noise`, `pulses`, `timing`, `silences`, `dip`, `bus` |
 //! | points | `points`, `analog_inputs`, `analog_outputs`, `dac_faults`, `counters`, `edges` |
@@ -30,7 +30,6 @@ mod air;
 mod alone;
 mod analog_inputs;
 mod analog_outputs;
-mod bench;
 mod boot;
 mod bus;
 mod campaign;
@@ -59,6 +58,7 @@ mod programmed;
 mod pulses;
 mod radio;
 mod registers;
+mod rig;
 mod saving;
 mod self_description;
 mod silences;

@@ -13,7 +13,7 @@ use fastrand::Rng;
 use register_map::configuration::{BAUD, FORMAT, STRICT_T15};
 use sim::{Channel, Module, Time};
 
-use crate::bench::{Bench, Most, adu, corner, crc};
+use crate::rig::{Most, Rig, adu, corner, crc};
 use damage::{Damaged, KINDS};
 use traffic::Outputs;
 
@@ -78,59 +78,58 @@ impl Soak {
     /// Continues on this line until `until` frames have been sent on all lines together.
     fn line(&mut self, index: usize, [baud, format, strict]: [u16; 3], until: usize) {
         let stored = [(BAUD, baud), (FORMAT, format), (STRICT_T15, strict)];
-        let mut bench = Bench::set_up(Module::Do4, &stored);
+        let mut rig = Rig::set_up(Module::Do4, &stored);
         // Other work that is due at the end of the silence delays a reply.
-        bench.patience = Time::from_us(60);
+        rig.patience = Time::from_us(60);
         let mut rng = Rng::with_seed(0x6D6F_6469_6F02 + index as u64);
         let mut outputs = Outputs::default();
         let (good, bad) = (self.good, self.damaged.iter().sum::<usize>());
         let undetectable = self.undetectable;
         while self.sent() < until {
-            self.round(&mut bench, &mut rng, &mut outputs);
+            self.round(&mut rig, &mut rng, &mut outputs);
             self.tell();
         }
         for (channel, on) in (1..).zip(outputs.0) {
-            assert_eq!(bench.board.channel(channel), Channel::Do { on });
+            assert_eq!(rig.board.channel(channel), Channel::Do { on });
         }
         // The unit must have counted the same number of frames, in 16 bits.
         let good = self.good - good + self.undetectable - undetectable;
         let bad = self.damaged.iter().sum::<usize>() - bad;
         for (sub, count) in [(0x0B, good + 1), (0x0C, bad)] {
             let [high, low] = (count as u16).to_be_bytes();
-            let reply = bench.ask(1, &[8, 0, sub, 0, 0]);
+            let reply = rig.ask(1, &[8, 0, sub, 0, 0]);
             assert_eq!(reply, Some(vec![8, 0, sub, high, low]), "{count} counted");
         }
     }
 
     /// Sends some damaged frames, then a valid one.
-    fn round(&mut self, bench: &mut Bench, rng: &mut Rng, outputs: &mut Outputs) {
+    fn round(&mut self, rig: &mut Rig, rng: &mut Rng, outputs: &mut Outputs) {
         // A receiver that has lost the start of a character may see the end of a damaged frame as a character that
         // ends almost one character later. The unit measures the silence from the interrupt, which may be delayed.
-        let silence = bench.t35() + bench.characters(1) + WAIT.of(corner());
-        let mut at = bench.board.now();
+        let silence = rig.t35() + rig.characters(1) + WAIT.of(corner());
+        let mut at = rig.board.now();
         let mut before = Vec::new();
         for _ in 0..rng.usize(0..4) {
             let damaged = damage::damaged(rng, outputs);
             if !damaged.has_fault() && is_good(&damaged.bytes) {
                 // The unit may treat this frame as valid, so send it alone and switch the outputs off afterwards.
                 self.undetectable += 1;
-                bench.board.run_until(at);
-                bench.exchange(&damaged.bytes);
-                bench
-                    .ask(1, &outputs.all_off())
+                rig.board.run_until(at);
+                rig.exchange(&damaged.bytes);
+                rig.ask(1, &outputs.all_off())
                     .expect("the unit executes the write");
                 self.good += 1;
                 self.answered += 1;
-                at = bench.board.now();
+                at = rig.board.now();
                 continue;
             }
             self.damaged[damaged.kind as usize] += 1;
-            at = send(bench, at, &damaged) + silence;
+            at = send(rig, at, &damaged) + silence;
             before.push(damaged);
         }
         let (request, reply) = traffic::request(rng, outputs);
-        bench.sent = bench.board.line().send(at, &adu(&request));
-        let received = bench.answer_after(bench.sent);
+        rig.sent = rig.board.line().send(at, &adu(&request));
+        let received = rig.answer_after(rig.sent);
         let expected = reply.map(|reply| adu(&reply)).unwrap_or_default();
         assert!(
             received == expected,
@@ -170,8 +169,8 @@ impl Soak {
 }
 
 /// Sends the frame at `at`. Returns the end of the last stop bit.
-fn send(bench: &mut Bench, at: sim::Time, damaged: &Damaged) -> sim::Time {
-    let line = bench.board.line();
+fn send(rig: &mut Rig, at: sim::Time, damaged: &Damaged) -> sim::Time {
+    let line = rig.board.line();
     let settings = line.settings();
     damaged
         .characters(settings)

@@ -6,9 +6,7 @@
 use fastrand::Rng;
 use sim::{Channel, Module, Time};
 
-use crate::bench::{
-    Bench, FIRST, GOOD_MV, LOW_MV, PAGE_ADDRESSES, PAGE_SIZE, PORT, SLOT, adu, pages,
-};
+use crate::rig::{FIRST, GOOD_MV, LOW_MV, PAGE_ADDRESSES, PAGE_SIZE, PORT, Rig, SLOT, adu, pages};
 
 const FILTER: u16 = 0x0120 + SLOT;
 const BETA: u16 = 0x0160;
@@ -29,10 +27,10 @@ const SAVE: Time = Time::from_ms(200);
 /// Number of starts after a cut. Unstable cells read differently at each start.
 const STARTS: usize = 2;
 
-fn bench() -> Bench {
-    let mut bench = Bench::set_up(Module::Di4, &[(0x0101, 1152)]);
-    bench.tolerant = true;
-    bench
+fn rig() -> Rig {
+    let mut rig = Rig::set_up(Module::Di4, &[(0x0101, 1152)]);
+    rig.tolerant = true;
+    rig
 }
 
 /// Returns four settings that no other round has.
@@ -41,12 +39,12 @@ fn set(round: u16) -> [u16; 4] {
 }
 
 /// Saves these settings. The lock must be open.
-fn save(bench: &mut Bench, values: [u16; 4]) {
-    bench.write(FILTER, &values).unwrap();
+fn save(rig: &mut Rig, values: [u16; 4]) {
+    rig.write(FILTER, &values).unwrap();
     for _ in 0..TRIES {
-        bench.write(0x0108, &[1]).unwrap();
-        bench.board.run_for(SAVE);
-        if !bench.status(8) {
+        rig.write(0x0108, &[1]).unwrap();
+        rig.board.run_for(SAVE);
+        if !rig.status(8) {
             return;
         }
     }
@@ -54,8 +52,8 @@ fn save(bench: &mut Bench, values: [u16; 4]) {
 }
 
 /// Returns the number of erased bytes at the end of each of the store's pages.
-fn rooms(bench: &Bench) -> [usize; 2] {
-    let flash = bench.board.flash();
+fn rooms(rig: &Rig) -> [usize; 2] {
+    let flash = rig.board.flash();
     pages().map(|page| {
         let bytes = flash[page].iter().rev();
         bytes.take_while(|byte| **byte == 0xFF).count()
@@ -64,23 +62,23 @@ fn rooms(bench: &Bench) -> [usize; 2] {
 
 /// Returns the set that is stored after a cut, which must be one of `sets`. Asserts that the rest of the device is in
 /// order.
-fn after_cut(bench: &mut Bench, sets: &[[u16; 4]], what: &str) -> [u16; 4] {
+fn after_cut(rig: &mut Rig, sets: &[[u16; 4]], what: &str) -> [u16; 4] {
     let mut first = None;
     for start in 0..STARTS {
-        bench.board.power_on();
-        bench.started();
-        let values = bench.registers(FILTER, 4).unwrap();
-        assert!(!bench.status(INVALID), "{what}: the store is not damaged");
-        assert_eq!(bench.registers(0x0101, 2), Ok(vec![1152, 0]), "{what}");
-        assert_eq!(bench.register(0x020F + PORT), 1, "{what}");
+        rig.board.power_on();
+        rig.started();
+        let values = rig.registers(FILTER, 4).unwrap();
+        assert!(!rig.status(INVALID), "{what}: the store is not damaged");
+        assert_eq!(rig.registers(0x0101, 2), Ok(vec![1152, 0]), "{what}");
+        assert_eq!(rig.register(0x020F + PORT), 1, "{what}");
         assert_eq!(
             first.get_or_insert_with(|| values.clone()),
             &values,
             "{what}: start {start} finds another configuration"
         );
         if start + 1 < STARTS {
-            bench.board.power_off();
-            bench.board.run_for(Time::from_ms(10));
+            rig.board.power_off();
+            rig.board.run_for(Time::from_ms(10));
         }
     }
     let values = first.unwrap_or_default();
@@ -91,62 +89,62 @@ fn after_cut(bench: &mut Bench, sets: &[[u16; 4]], what: &str) -> [u16; 4] {
 /// Cuts the power in every operation of a save, each at another of the four instants. `prepare` brings the store to
 /// its state before the save and returns the stored settings. Returns the number of operations of the save.
 fn every_cut_of_a_save(
-    bench: &mut Bench,
-    mut prepare: impl FnMut(&mut Bench, [u16; 4]) -> [u16; 4],
+    rig: &mut Rig,
+    mut prepare: impl FnMut(&mut Rig, [u16; 4]) -> [u16; 4],
 ) -> u64 {
     let mut stored = [5; 4];
     let mut changed = 0;
     for operation in 1.. {
-        let old = prepare(bench, stored);
+        let old = prepare(rig, stored);
         // No settings that `fill` saves.
         let new = set(100 + operation as u16);
-        bench.configure(FILTER, &new);
+        rig.configure(FILTER, &new);
         let fraction = FRACTIONS[operation as usize % FRACTIONS.len()];
-        bench.board.cut_in_flash_operation(operation, fraction);
-        bench.write(0x0108, &[1]).unwrap();
+        rig.board.cut_in_flash_operation(operation, fraction);
+        rig.write(0x0108, &[1]).unwrap();
         // The save may have waited for the supply.
-        bench.board.run_for(Time::from_ms(20));
-        bench.board.set_supply_mv(GOOD_MV).unwrap();
-        bench.board.run_for(Time::from_ms(300));
-        if bench.board.powered() {
+        rig.board.run_for(Time::from_ms(20));
+        rig.board.set_supply_mv(GOOD_MV).unwrap();
+        rig.board.run_for(Time::from_ms(300));
+        if rig.board.powered() {
             assert!(changed > 0 && changed < operation - 1, "{changed} changed");
             return operation - 1;
         }
         let what = format!("operation {operation}, {fraction} of it");
-        stored = after_cut(bench, &[old, new], &what);
+        stored = after_cut(rig, &[old, new], &what);
         changed += u64::from(stored == new);
     }
     unreachable!()
 }
 
 /// Returns the content of the store's pages.
-fn store(bench: &Bench) -> Vec<u8> {
+fn store(rig: &Rig) -> Vec<u8> {
     let [first, second] = pages();
-    bench.board.flash()[first.start..second.end].to_vec()
+    rig.board.flash()[first.start..second.end].to_vec()
 }
 
 /// Switches the power off and gives the store's pages this content.
-fn restore(bench: &mut Bench, content: &[u8]) {
-    bench.board.power_off();
+fn restore(rig: &mut Rig, content: &[u8]) {
+    rig.board.power_off();
     let [first, _] = PAGE_ADDRESSES;
-    bench.board.patch_code(first, content).unwrap();
+    rig.board.patch_code(first, content).unwrap();
 }
 
 /// Saves until the page in use has no room for another record. The other page is then spare. Returns the last
 /// settings.
-fn fill(bench: &mut Bench) -> [u16; 4] {
+fn fill(rig: &mut Rig) -> [u16; 4] {
     let mut round = 0;
     // Both pages have records or a mark; the page with more bytes is in use. Large records come first, because only
     // twenty saves are possible together.
-    while rooms(bench).iter().min() >= Some(&LARGE_RECORD) {
+    while rooms(rig).iter().min() >= Some(&LARGE_RECORD) {
         round += 1;
-        bench.write(BETA, &[2000 + round % 900; 32]).unwrap();
-        save(bench, set(round));
+        rig.write(BETA, &[2000 + round % 900; 32]).unwrap();
+        save(rig, set(round));
     }
-    bench.write(BETA, &[3950; 32]).unwrap();
-    while rooms(bench).iter().min() >= Some(&(HALF_WORDS as usize * 2)) {
+    rig.write(BETA, &[3950; 32]).unwrap();
+    while rooms(rig).iter().min() >= Some(&(HALF_WORDS as usize * 2)) {
         round += 1;
-        save(bench, set(round));
+        save(rig, set(round));
     }
     set(round)
 }
@@ -154,8 +152,8 @@ fn fill(bench: &mut Bench) -> [u16; 4] {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn at_any_operation_of_a_save_after_the_last_record() {
-    let operations = every_cut_of_a_save(&mut bench(), |bench, stored| {
-        bench.unlock();
+    let operations = every_cut_of_a_save(&mut rig(), |rig, stored| {
+        rig.unlock();
         stored
     });
     // The record alone, or with the erase of the other page.
@@ -170,21 +168,21 @@ fn at_any_operation_of_a_save_after_the_last_record() {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn at_any_operation_of_a_save_that_has_to_erase() {
-    let mut bench = bench();
-    bench.unlock();
-    let last = fill(&mut bench);
-    let spare = rooms(&bench)
+    let mut rig = rig();
+    rig.unlock();
+    let last = fill(&mut rig);
+    let spare = rooms(&rig)
         .iter()
         .position(|room| *room >= PAGE_SIZE - 24)
         .expect("a spare page");
-    let mut content = store(&bench);
+    let mut content = store(&rig);
     content[spare * PAGE_SIZE..][..PAGE_SIZE].fill(0);
-    let operations = every_cut_of_a_save(&mut bench, |bench, _| {
-        restore(bench, &content);
-        bench.board.set_supply_mv(LOW_MV).unwrap();
-        bench.board.power_on();
-        bench.started();
-        bench.unlock();
+    let operations = every_cut_of_a_save(&mut rig, |rig, _| {
+        restore(rig, &content);
+        rig.board.set_supply_mv(LOW_MV).unwrap();
+        rig.board.power_on();
+        rig.started();
+        rig.unlock();
         last
     });
     assert!(
@@ -196,26 +194,26 @@ fn at_any_operation_of_a_save_that_has_to_erase() {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn at_any_operation_of_the_start_that_makes_room_again() {
-    let mut bench = bench();
-    bench.unlock();
-    save(&mut bench, set(1));
-    bench.configure(FILTER, &set(2));
+    let mut rig = rig();
+    rig.unlock();
+    save(&mut rig, set(1));
+    rig.configure(FILTER, &set(2));
     // A record cut in two: the next start moves the record before it to the other page.
-    bench.board.cut_in_flash_operation(HALF_WORDS / 2, 0.5);
-    bench.write(0x0108, &[1]).unwrap();
-    bench.board.run_for(Time::from_ms(60));
-    assert!(!bench.board.powered());
-    let content = store(&bench);
+    rig.board.cut_in_flash_operation(HALF_WORDS / 2, 0.5);
+    rig.write(0x0108, &[1]).unwrap();
+    rig.board.run_for(Time::from_ms(60));
+    assert!(!rig.board.powered());
+    let content = store(&rig);
     for operation in 1.. {
-        restore(&mut bench, &content);
+        restore(&mut rig, &content);
         let fraction = FRACTIONS[operation as usize % FRACTIONS.len()];
-        bench.board.cut_in_flash_operation(operation, fraction);
-        bench.board.power_on();
-        bench.board.run_for(Time::from_ms(300));
-        let done = bench.board.powered();
-        bench.board.power_off();
+        rig.board.cut_in_flash_operation(operation, fraction);
+        rig.board.power_on();
+        rig.board.run_for(Time::from_ms(300));
+        let done = rig.board.powered();
+        rig.board.power_off();
         let what = format!("operation {operation}, {fraction} of it");
-        after_cut(&mut bench, &[set(1)], &what);
+        after_cut(&mut rig, &[set(1)], &what);
         if done {
             assert!(operation > HALF_WORDS + 2, "only {operation} operations");
             return;
@@ -227,16 +225,16 @@ fn at_any_operation_of_the_start_that_makes_room_again() {
 #[ignore = "needs the image: cargo xtask test"]
 fn at_any_instant_under_traffic() {
     let mut rng = Rng::with_seed(0x6D6F_6469_6F03);
-    let mut bench = Bench::set_up(Module::Do4, &[(0x0101, 1152)]);
-    bench.tolerant = true;
+    let mut rig = Rig::set_up(Module::Do4, &[(0x0101, 1152)]);
+    rig.tolerant = true;
     let mut stored = [0u16; 4];
     let mut saves = 0;
     for round in 0..50 {
         // The settings that may be stored at the end of this round.
         let mut candidates = vec![stored];
-        let cut = bench.board.now() + Time::from_us(rng.u64(1_000..150_000));
-        bench.unlock();
-        while bench.board.now() < cut {
+        let cut = rig.board.now() + Time::from_us(rng.u64(1_000..150_000));
+        rig.unlock();
+        while rig.board.now() < cut {
             let settings = [0; 4].map(|_| rng.u16(0..2));
             let words: Vec<u8> = settings
                 .iter()
@@ -258,27 +256,27 @@ fn at_any_instant_under_traffic() {
                 saves += 1;
             }
             for request in requests {
-                let now = bench.board.now();
-                let end = bench.board.line().send(now, &adu(request));
-                bench.board.run_until(cut.min(end + Time::from_ms(4)));
-                bench.board.line().take_received();
+                let now = rig.board.now();
+                let end = rig.board.line().send(now, &adu(request));
+                rig.board.run_until(cut.min(end + Time::from_ms(4)));
+                rig.board.line().take_received();
             }
         }
-        bench.board.power_off();
+        rig.board.power_off();
         for channel in 1..=4 {
-            assert_eq!(bench.board.channel(channel), Channel::Do { on: false });
+            assert_eq!(rig.board.channel(channel), Channel::Do { on: false });
         }
-        bench.board.run_for(Time::from_us(rng.u64(1..50_000)));
-        bench.board.power_on();
-        bench.started();
-        let start = bench.registers(0x01E0 + SLOT, 4).unwrap();
+        rig.board.run_for(Time::from_us(rng.u64(1..50_000)));
+        rig.board.power_on();
+        rig.started();
+        let start = rig.registers(0x01E0 + SLOT, 4).unwrap();
         let known = candidates.iter().find(|set| set[..] == start);
         stored =
             *known.unwrap_or_else(|| panic!("round {round}: {start:?}, not of {candidates:?}"));
         let on: Vec<bool> = stored.iter().map(|value| *value != 0).collect();
-        assert_eq!(bench.bits(1, SLOT, 4), Ok(on), "round {round}: START");
-        assert!(!bench.status(INVALID), "round {round}");
-        assert!(!bench.board.locked_up());
+        assert_eq!(rig.bits(1, SLOT, 4), Ok(on), "round {round}: START");
+        assert!(!rig.status(INVALID), "round {round}");
+        assert!(!rig.board.locked_up());
     }
     assert!(saves > 40, "only {saves} saves");
 }

@@ -6,8 +6,8 @@ use register_map::{configuration::MODULE, update::Slot};
 use sim::board::{Firmware, InSlot, MODIO_02};
 
 use crate::{
-    bench::{PORT, file},
     in_slots::{START, answers, holding},
+    rig::{PORT, file},
 };
 
 #[test]
@@ -28,17 +28,17 @@ fn programmed_board_starts_like_one_that_was_started_once() {
         firmware.program(&MODIO_02, &mut flash, false).unwrap();
         assert!(MODIO_02.store(&mut flash, &[(MODULE + PORT - 1, 1)]));
         let state = flash[boot.clone()].to_vec();
-        let mut bench = holding(flash, 1);
-        assert_eq!(bench.board.running_slot(), None, "the loader");
-        answers(&mut bench, START).expect(name);
-        assert_eq!(bench.board.running_slot(), Some(starts), "{name}");
-        assert_eq!(bench.board.resets(), 0, "no signature is checked");
+        let mut rig = holding(flash, 1);
+        assert_eq!(rig.board.running_slot(), None, "the loader");
+        answers(&mut rig, START).expect(name);
+        assert_eq!(rig.board.running_slot(), Some(starts), "{name}");
+        assert_eq!(rig.board.resets(), 0, "no signature is checked");
         assert_eq!(
-            bench.board.flash()[boot.clone()],
+            rig.board.flash()[boot.clone()],
             state,
             "the loader keeps it"
         );
-        let log = bench.board.take_log();
+        let log = rig.board.take_log();
         assert!(log.starts_with("modio "), "{log:?}");
     }
 }

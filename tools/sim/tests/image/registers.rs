@@ -2,9 +2,9 @@
 
 use sim::Time;
 
-use crate::bench::Bench;
+use crate::rig::Rig;
 
-impl Bench {
+impl Rig {
     /// Sends a PDU. Returns the bytes after the function code of the reply, or the exception code.
     pub fn request(&mut self, pdu: &[u8]) -> Result<Vec<u8>, u8> {
         // The first reply after a save may wait for an erase.

@@ -4,7 +4,7 @@
 use register_map::{codes::Baud, configuration, fault};
 use sim::{Corner, Module, Time, periph::flash::Durations, soc::map::Block};
 
-use crate::bench::{Bench, FIRST, PAGE_SIZE, SLOT, adu, corner, pages};
+use crate::rig::{FIRST, PAGE_SIZE, Rig, SLOT, adu, corner, pages};
 
 const FILTER: u16 = 0x0120 + SLOT;
 const UNSAVED: u16 = 8;
@@ -36,7 +36,7 @@ pub fn large() -> Vec<(u16, u16)> {
 
 /// A master that sends requests without a pause and counts them.
 struct Master {
-    bench: Bench,
+    rig: Rig,
     asked: u32,
     late: Vec<Time>,
 }
@@ -44,10 +44,10 @@ struct Master {
 impl Master {
     fn new(module: Module, settings: &[(u16, u16)]) -> Self {
         let settings = [&[(0x0101, 1152)], settings].concat();
-        let mut bench = Bench::set_up(module, &settings);
-        bench.board.set_flash_durations(SLOWEST);
+        let mut rig = Rig::set_up(module, &settings);
+        rig.board.set_flash_durations(SLOWEST);
         Self {
-            bench,
+            rig,
             asked: 0,
             late: Vec::new(),
         }
@@ -56,7 +56,7 @@ impl Master {
     /// Sends a request and returns the reply. Stores the delay of a late reply.
     fn ask(&mut self, pdu: &[u8]) -> Vec<u8> {
         self.asked += 1;
-        let (reply, late) = self.bench.hurry(Time::ZERO, &adu(&[&[1], pdu].concat()));
+        let (reply, late) = self.rig.hurry(Time::ZERO, &adu(&[&[1], pdu].concat()));
         // Programming a half-word may delay the reply by the duration of the operation.
         if late > Time::from_us(320) {
             self.late.push(late);
@@ -98,19 +98,19 @@ impl Master {
 fn no_request_goes_unanswered_while_saves_run_one_after_another() {
     let mut master = Master::new(Module::Di4, &[]);
     master.write(0x0100, 0x5A17);
-    let operations = master.bench.board.flash_operations();
+    let operations = master.rig.board.flash_operations();
     for n in 0..20 {
         master.write(FILTER + n % 4, 10 + n);
         master.save();
     }
-    let programmed = master.bench.board.flash_operations() - operations;
+    let programmed = master.rig.board.flash_operations() - operations;
     assert!(programmed > 20 * 8, "only {programmed} operations");
     // Twenty small records fit in a page, so nothing is erased.
     assert_eq!(master.late, [], "a reply was late");
-    assert_eq!(master.bench.register(0x0231), 0, "no bus error was seen");
-    assert_eq!(master.bench.register(0x0237), 0, "no character was lost");
-    master.bench.power_cycle();
-    assert_eq!(master.bench.registers(FILTER, 4), Ok(vec![26, 27, 28, 29]));
+    assert_eq!(master.rig.register(0x0231), 0, "no bus error was seen");
+    assert_eq!(master.rig.register(0x0237), 0, "no character was lost");
+    master.rig.power_cycle();
+    assert_eq!(master.rig.registers(FILTER, 4), Ok(vec![26, 27, 28, 29]));
 }
 
 /// The page that is no longer needed is erased after the save. One reply is late by the rest of the erase at the end of
@@ -132,11 +132,11 @@ fn erases_of_many_saves_lose_no_request() {
     // A request that ends with the start of an erase waits for all of it.
     let most = SLOWEST.erase + Time::from_us(50);
     assert!(late.iter().all(|late| *late < most), "{late:?}");
-    assert_eq!(master.bench.register(0x0231), 0, "no bus error was seen");
-    assert_eq!(master.bench.register(0x0237), 0, "no character was lost");
-    assert_eq!(master.bench.board.resets(), 0);
-    master.bench.power_cycle();
-    assert_eq!(master.bench.registers(FILTER, 4), Ok(vec![22, 23, 20, 21]));
+    assert_eq!(master.rig.register(0x0231), 0, "no bus error was seen");
+    assert_eq!(master.rig.register(0x0237), 0, "no character was lost");
+    assert_eq!(master.rig.board.resets(), 0);
+    master.rig.power_cycle();
+    assert_eq!(master.rig.registers(FILTER, 4), Ok(vec![22, 23, 20, 21]));
 }
 
 /// No request is served while the background task holds the device, nor while code in RAM programs the flash, which
@@ -150,7 +150,7 @@ fn a_save_of_all_settings_holds_requests_off_for_at_most_22_us_at_a_time_38_at_t
     let mut master = Master::new(Module::Di4, &large());
     master.write(0x0100, 0x5A17);
     master.write(FILTER, 10);
-    let board = &mut master.bench.board;
+    let board = &mut master.rig.board;
     let operations = board.flash_operations();
     let request = adu(&[1, 6, 0x01, 0x08, 0, 1]);
     let now = board.now();
@@ -183,43 +183,43 @@ fn a_save_of_all_settings_holds_requests_off_for_at_most_22_us_at_a_time_38_at_t
 #[ignore = "needs the image: cargo xtask test"]
 fn line_is_set_up_again_during_an_erase_by_code_that_does_not_wait() {
     const BRR: u32 = 0x08;
-    let mut bench = Master::new(Module::Di4, &large()).bench;
+    let mut rig = Master::new(Module::Di4, &large()).rig;
     let mut repaired = 0;
     for n in 0..4 {
-        bench.configure(FILTER, &[10 + n]);
-        bench.write(0x0108, &[1]).unwrap();
+        rig.configure(FILTER, &[10 + n]);
+        rig.write(0x0108, &[1]).unwrap();
         let mut last = 0;
         for _ in 0..100 {
-            bench.board.run_for(Time::from_ms(1));
-            let operations = bench.board.flash_operations();
-            let erases = bench.board.pc() >= 0x2000_0000 && operations == last;
+            rig.board.run_for(Time::from_ms(1));
+            let operations = rig.board.flash_operations();
+            let erases = rig.board.pc() >= 0x2000_0000 && operations == last;
             last = operations;
             if erases {
-                bench.board.upset(Block::Usart1, BRR, 1 << 10);
-                bench.board.run_for(Time::from_ms(10));
-                assert_eq!(bench.board.flash_operations(), last, "the erase has ended");
+                rig.board.upset(Block::Usart1, BRR, 1 << 10);
+                rig.board.run_for(Time::from_ms(10));
+                assert_eq!(rig.board.flash_operations(), last, "the erase has ended");
                 repaired += 1;
                 break;
             }
         }
-        bench.board.run_for(Time::from_ms(150));
-        bench.assert_answers(1);
+        rig.board.run_for(Time::from_ms(150));
+        rig.assert_answers(1);
     }
     assert!(repaired > 0, "no erase");
-    assert_eq!(bench.register(fault::LINE_REPAIRS), repaired);
+    assert_eq!(rig.register(fault::LINE_REPAIRS), repaired);
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn a_restart_waits_for_a_running_save() {
-    let mut bench = Bench::set_up(Module::Di4, &[]);
-    bench.tolerant = true;
-    bench.configure(FILTER, &[77]);
-    bench.write(0x0108, &[1]).unwrap();
-    bench.write(0x0108, &[2]).unwrap();
-    bench.started();
-    assert_eq!(bench.board.resets(), 1);
-    assert_eq!(bench.register(FILTER), 77);
+    let mut rig = Rig::set_up(Module::Di4, &[]);
+    rig.tolerant = true;
+    rig.configure(FILTER, &[77]);
+    rig.write(0x0108, &[1]).unwrap();
+    rig.write(0x0108, &[2]).unwrap();
+    rig.started();
+    assert_eq!(rig.board.resets(), 1);
+    assert_eq!(rig.register(FILTER), 77);
 }
 
 /// Other units communicate without a pause while settings are saved and pages are erased: the unit receives every
@@ -232,37 +232,35 @@ fn no_byte_is_lost_at_any_rate_while_saves_run() {
         .filter(|baud| baud.bits_per_second() >= 57_600)
     {
         let settings = [&[(configuration::BAUD, baud.code())], &large()[..]].concat();
-        let mut bench = Bench::set_up(Module::Di4, &settings);
-        bench.board.set_flash_durations(SLOWEST);
+        let mut rig = Rig::set_up(Module::Di4, &settings);
+        rig.board.set_flash_durations(SLOWEST);
         for n in 0..3 {
-            bench.configure(FILTER, &[10 + n]);
-            assert_eq!(bench.ask(1, &[8, 0, 10, 0, 0]), Some(vec![8, 0, 10, 0, 0]));
-            let operations = bench.board.flash_operations();
-            bench.write(0x0108, &[1]).unwrap();
+            rig.configure(FILTER, &[10 + n]);
+            assert_eq!(rig.ask(1, &[8, 0, 10, 0, 0]), Some(vec![8, 0, 10, 0, 0]));
+            let operations = rig.board.flash_operations();
+            rig.write(0x0108, &[1]).unwrap();
             // A read of another unit and its reply, repeated.
             let request = adu(&[2, 3, 0, 0, 0, 100]);
             let reply = adu(&[&[2, 3, 200][..], &[0x5A; 200]].concat());
-            let end = bench.board.now() + Time::from_ms(200);
+            let end = rig.board.now() + Time::from_ms(200);
             let mut sent = 0;
-            while bench.board.now() < end {
+            while rig.board.now() < end {
                 for frame in [&request, &reply] {
-                    let now = bench.board.now();
-                    let over = bench.board.line().send(now, frame);
+                    let now = rig.board.now();
+                    let over = rig.board.line().send(now, frame);
                     // The silence counts from the interrupt of the last byte, which may have waited: up to 8.5 us at the
                     // slow corner. A start bit that is already there then counts as part of the frame.
-                    bench
-                        .board
-                        .run_until(over + bench.t35() + bench.characters(2));
+                    rig.board.run_until(over + rig.t35() + rig.characters(2));
                     sent += 1;
                 }
             }
-            let operations = bench.board.flash_operations() - operations;
+            let operations = rig.board.flash_operations() - operations;
             assert!(operations > 190, "{baud:?}: {operations} operations");
-            let counted = bench.ask(1, &[8, 0, 11, 0, 0]).expect("a reply");
+            let counted = rig.ask(1, &[8, 0, 11, 0, 0]).expect("a reply");
             let counted = u16::from_be_bytes([counted[3], counted[4]]);
             // The unit has also received the request to save and the request that reads the counter.
             assert_eq!(counted, sent + 2, "{baud:?}, save {n}");
-            let errors = bench.ask(1, &[8, 0, 12, 0, 0]).expect("a reply");
+            let errors = rig.ask(1, &[8, 0, 12, 0, 0]).expect("a reply");
             assert_eq!(errors, [8, 0, 12, 0, 0], "{baud:?}");
         }
     }
@@ -275,50 +273,47 @@ fn uptime_and_communication_watchdog_are_right_over_many_erases() {
     let mut master = Master::new(Module::Do4, &large());
     master.write(0x0100, 0x5A17);
     master.write(configuration::COMM_TIMEOUT, 1);
-    let bench = &mut master.bench;
-    bench.write_bits(SLOT, &[true; 4]).unwrap();
+    let rig = &mut master.rig;
+    rig.write_bits(SLOT, &[true; 4]).unwrap();
     // Waits until the uptime shows another second. Returns the time, about 20 ms late, and that second.
-    let next_second = |bench: &mut Bench| {
-        bench.patience = Time::ZERO;
-        let was = bench.long(0x0208);
+    let next_second = |rig: &mut Rig| {
+        rig.patience = Time::ZERO;
+        let was = rig.long(0x0208);
         loop {
-            let second = bench.long(0x0208);
+            let second = rig.long(0x0208);
             if second != was {
-                return (bench.board.now(), u64::from(second));
+                return (rig.board.now(), u64::from(second));
             }
         }
     };
-    let (from, first) = next_second(bench);
-    let spare = |bench: &Bench| {
-        let flash = bench.board.flash();
+    let (from, first) = next_second(rig);
+    let spare = |rig: &Rig| {
+        let flash = rig.board.flash();
         pages().map(|page| flash[page][2..].iter().all(|b| *b == 0xFF))
     };
     let mut erases = 0;
-    bench.patience = Time::from_ms(50);
+    rig.patience = Time::from_ms(50);
     for n in 0..20 {
-        bench.configure(FILTER, &[10 + n]);
-        let before = spare(bench);
-        bench.write(0x0108, &[1]).unwrap();
+        rig.configure(FILTER, &[10 + n]);
+        let before = spare(rig);
+        rig.write(0x0108, &[1]).unwrap();
         // A request every 90 ms keeps a time-out of 100 ms from tripping, even during an erase.
         for _ in 0..6 {
-            let next = bench.sent + Time::from_ms(90);
-            bench.board.run_until(next);
-            assert!(bench.ask(1, &[1, 0, FIRST, 0, 4]).is_some());
+            let next = rig.sent + Time::from_ms(90);
+            rig.board.run_until(next);
+            assert!(rig.ask(1, &[1, 0, FIRST, 0, 4]).is_some());
         }
-        erases += u32::from(spare(bench) != before);
+        erases += u32::from(spare(rig) != before);
     }
     assert!(erases > 5, "{erases} erases");
-    assert!(
-        !bench.status(1),
-        "the communication watchdog has not tripped"
-    );
-    let (until, last) = next_second(bench);
+    assert!(!rig.status(1), "the communication watchdog has not tripped");
+    let (until, last) = next_second(rig);
     let (passed, counted) = ((until - from).as_ms(), 1000 * (last - first));
     assert!(
         counted.abs_diff(passed) <= 100,
         "{counted} ms of {passed} ms"
     );
     // Without requests the watchdog trips.
-    bench.board.run_for(Time::from_ms(110));
-    assert!(bench.status(1));
+    rig.board.run_for(Time::from_ms(110));
+    assert!(rig.status(1));
 }

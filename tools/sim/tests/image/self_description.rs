@@ -5,7 +5,7 @@ use register_map::Module as Known;
 use sim::Module;
 
 use crate::LAYOUT;
-use crate::bench::{Bench, MODULE, PORT};
+use crate::rig::{MODULE, PORT, Rig};
 
 /// Groups of records: file, first record and number of records.
 pub type Groups<'a> = &'a [(u16, u16, u16)];
@@ -24,7 +24,7 @@ pub fn request(groups: Groups<'_>) -> Vec<u8> {
     pdu
 }
 
-impl Bench {
+impl Rig {
     /// Reads groups of records by one request. Returns the bytes of each group, or the exception code.
     fn read_file(&mut self, groups: Groups<'_>) -> Result<Vec<Vec<u8>>, u8> {
         let data = self.request(&request(groups))?;
@@ -82,19 +82,19 @@ impl Bench {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn crc_changes_with_the_module_in_force() {
-    let mut bench = Bench::set_up(Module::Di4, &[]);
-    let file = bench.self_description(1);
-    let before = bench.assert_described(Known::Di4, &file);
-    bench.configure(MODULE, &[Known::Ai2Ao2.code()]);
-    bench.save();
+    let mut rig = Rig::set_up(Module::Di4, &[]);
+    let file = rig.self_description(1);
+    let before = rig.assert_described(Known::Di4, &file);
+    rig.configure(MODULE, &[Known::Ai2Ao2.code()]);
+    rig.save();
     assert_eq!(
-        bench.self_description(1),
+        rig.self_description(1),
         file,
         "the new module is not in force yet"
     );
-    bench.tolerant = true;
-    bench.restart();
-    let file = bench.self_description(3);
-    let after = bench.assert_described(Known::Ai2Ao2, &file);
+    rig.tolerant = true;
+    rig.restart();
+    let file = rig.self_description(3);
+    let after = rig.assert_described(Known::Ai2Ao2, &file);
     assert_ne!(before, after);
 }

@@ -9,7 +9,7 @@ use sim::line::{Direction, Settings};
 use sim::radio::Parameters;
 use sim::{Config, Module, Time};
 
-use crate::bench::{Bench, adu, ascii, config};
+use crate::rig::{Rig, adu, ascii, config};
 use crate::saving::{SLOWEST, large};
 use crate::self_description::request;
 
@@ -39,7 +39,7 @@ fn requests() -> [(&'static str, Vec<u8>); 7] {
 
 /// A unit under load: it saves its settings and erases pages while it also answers over the air.
 struct Loaded {
-    bench: Bench,
+    rig: Rig,
     is_ascii: bool,
     on_air: Time,
 }
@@ -53,21 +53,21 @@ impl Loaded {
             (LORA_AIR_RATE, 5),
             (LORA_FRAME_GAP, 50),
         ];
-        let mut bench = Bench::with(Config {
+        let mut rig = Rig::with(Config {
             radio: Some(Parameters::FACTORY),
             ..config(Module::Ai2Ao2, &[&settings, &large()[..]].concat())
         });
-        bench.settings(Settings {
+        rig.settings(Settings {
             baud: baud.bits_per_second(),
             ..Settings::default()
         });
-        bench.board.set_flash_durations(SLOWEST);
+        rig.board.set_flash_durations(SLOWEST);
         // The radio module sets itself up.
-        bench.board.run_for(Time::from_ms(1_500));
+        rig.board.run_for(Time::from_ms(1_500));
         // A request that ends during an erase is answered after the erase.
-        bench.patience = Time::from_ms(60);
+        rig.patience = Time::from_ms(60);
         Self {
-            bench,
+            rig,
             is_ascii,
             on_air: Time::ZERO,
         }
@@ -75,7 +75,7 @@ impl Loaded {
 
     /// Sends a request. Returns the longest silence inside the reply, or `None` when the reply is not a complete frame.
     fn silence(&mut self, pdu: &[u8]) -> Option<Time> {
-        let board = &mut self.bench.board;
+        let board = &mut self.rig.board;
         let now = board.now();
         if now >= self.on_air {
             let air = board.air().expect("a radio");
@@ -88,8 +88,8 @@ impl Loaded {
         } else {
             adu(&[&[1], pdu].concat())
         };
-        self.bench.exchange(&frame);
-        let reply = self.bench.board.line().frames().next_back()?;
+        self.rig.exchange(&frame);
+        let reply = self.rig.board.line().frames().next_back()?;
         if reply.direction != Direction::Response || !reply.crc_ok {
             return None;
         }
@@ -126,20 +126,20 @@ fn no_reply_has_a_silence_of_more_than_half_a_character_under_any_load() {
     ] {
         for &baud in bauds {
             let mut loaded = Loaded::new(baud, is_ascii);
-            let half = Time::from_ps(loaded.bench.characters(1).as_ps() / 2);
+            let half = Time::from_ps(loaded.rig.characters(1).as_ps() / 2);
             let mut longest = requests().map(|(name, _)| (name, Some(Time::ZERO)));
-            let operations = loaded.bench.board.flash_operations();
+            let operations = loaded.rig.board.flash_operations();
             for value in 10..13 {
                 loaded.save(value);
-                let end = loaded.bench.board.now() + SAVE;
-                while loaded.bench.board.now() < end {
+                let end = loaded.rig.board.now() + SAVE;
+                while loaded.rig.board.now() < end {
                     for ((_, longest), (_, pdu)) in longest.iter_mut().zip(requests()) {
                         let silence = loaded.silence(&pdu);
                         *longest = longest.and_then(|longest| Some(longest.max(silence?)));
                     }
                 }
             }
-            let operations = loaded.bench.board.flash_operations() - operations;
+            let operations = loaded.rig.board.flash_operations() - operations;
             assert!(operations > 3 * 190, "{baud:?}: {operations} operations");
             for (name, silence) in longest {
                 let mode = if is_ascii { "ASCII" } else { "RTU" };

@@ -4,7 +4,7 @@ use register_map::{codes::Baud, configuration};
 use sim::{Module, Time, line::Direction};
 
 use crate::LAYOUT;
-use crate::bench::{Bench, FIRST, Most, adu, ascii, corner};
+use crate::rig::{FIRST, Most, Rig, adu, ascii, corner};
 
 /// From t3.5 to the write of the first byte to the UART's data register. The baud generator adds up to a bit.
 const LATE: Most = Most(Time::from_us(25), Time::from_us(45));
@@ -19,19 +19,19 @@ const ON: Most = Most(Time::from_us(1), Time::from_us(1));
 /// From the last stop bit to disabling the driver.
 const OFF: Most = Most(Time::from_ns(1_400), Time::from_ns(2_350));
 /// The same when another interrupt of the line, usually the 1 kHz tick, has just occurred: the longest wait that `cargo
-/// xtask bench` allows, 5.0 us, and the handler; at the slow corner the time of [`Bench::ready`] at high rates.
+/// xtask bench` allows, 5.0 us, and the handler; at the slow corner the time of [`Rig::ready`] at high rates.
 const OFF_BEHIND: Most = Most(Time::from_ns(6_250), Time::from_us(10));
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn reply_starts_at_t35_and_the_driver_is_on_only_for_the_reply() {
-    let mut bench = Bench::new(Module::Di4, 1);
-    let (bit, sixteenth) = (bench.bit(), bench.sixteenth());
+    let mut rig = Rig::new(Module::Di4, 1);
+    let (bit, sixteenth) = (rig.bit(), rig.sixteenth());
     for _ in 0..10 {
-        let now = bench.board.now();
-        let end = bench.board.line().send(now, &adu(&[1, 1, 0, FIRST, 0, 4]));
-        bench.answer_after(end);
+        let now = rig.board.now();
+        let end = rig.board.line().send(now, &adu(&[1, 1, 0, FIRST, 0, 4]));
+        rig.answer_after(end);
 
-        let line = bench.board.line();
+        let line = rig.board.line();
         let frame = line.frames().next_back().expect("a reply").clone();
         assert_eq!(frame.direction, Direction::Response);
         assert!(frame.crc_ok && !frame.damaged);
@@ -84,19 +84,19 @@ fn driver_is_off_soon_after_the_reply_at_every_rate_and_format() {
                 (configuration::FORMAT, format),
                 (configuration::MODE, mode),
             ];
-            let mut bench = Bench::set_up(Module::Di4, &line);
-            // At the highest rates the bench would not wait this long. Other work may delay a reply by more than LATE.
-            bench.patience = Time::from_us(200);
-            let bit = bench.bit();
+            let mut rig = Rig::set_up(Module::Di4, &line);
+            // At the highest rates the rig would not wait this long. Other work may delay a reply by more than LATE.
+            rig.patience = Time::from_us(200);
+            let bit = rig.bit();
             let request = match mode {
                 0 => adu(&[1, 3, 1, 0, 0, 9]),
                 _ => ascii(&[3, 1, 0, 0, 9], "\r\n"),
             };
             let mut least = u64::MAX;
             for _ in 0..2 {
-                bench.exchange(&request);
-                let clocks = bench.clocks();
-                let line = bench.board.line();
+                rig.exchange(&request);
+                let clocks = rig.clocks();
+                let line = rig.board.line();
                 let frame = line.frames().next_back().expect("a reply").clone();
                 assert_eq!(
                     frame.direction,
@@ -137,10 +137,10 @@ fn driver_is_off_soon_after_the_reply_at_every_rate_and_format() {
 #[ignore = "needs the image: cargo xtask test"]
 fn replies_are_complete_and_the_next_request_is_received_at_every_phase_of_the_scan() {
     for baud in [Baud::B230400, Baud::B460800, Baud::B921600] {
-        let mut bench = Bench::set_up(Module::Di4, &[(configuration::BAUD, baud.code())]);
+        let mut rig = Rig::set_up(Module::Di4, &[(configuration::BAUD, baud.code())]);
         for phase in 0..1500 {
             let rest = Time::from_ns(667 * phase * (phase % 2));
-            let (reply, _) = bench.hurry(rest, &adu(&[1, 3, 2, 0, 0, 2]));
+            let (reply, _) = rig.hurry(rest, &adu(&[1, 3, 2, 0, 0, 2]));
             let expected = adu(&[1, 3, 4, 0x23, 0x83, 0x58, 0x60]);
             assert_eq!(reply, expected, "{baud:?}, phase {phase}");
         }

@@ -5,7 +5,7 @@ use register_map::{codes::Baud, configuration, fault};
 use sim::soc::map::{Block, irq};
 use sim::{Channel, Module, Time};
 
-use crate::bench::{Bench, FIRST, SLOT, adu};
+use crate::rig::{FIRST, Rig, SLOT, adu};
 
 /// A register that is disturbed: its block (`None` for the core's interrupt controller), offset, bits, and name.
 type Register = (Option<Block>, u32, u32, &'static str);
@@ -99,21 +99,21 @@ const OUTPUTS: [u8; 6] = [1, 1, 0, FIRST, 0, 4];
 const ALL_ON: [u8; 4] = [1, 1, 1, 0x0F];
 
 /// Returns a board whose outputs are all on.
-fn bench(baud: Baud) -> Bench {
-    let mut bench = Bench::set_up(Module::Do4, &[(configuration::BAUD, baud.code())]);
-    bench.tolerant = true;
-    bench.patience = Time::from_ms(1);
-    bench.write_bits(SLOT, &[true; 4]).unwrap();
-    bench.board.run_for(Time::from_ms(40));
-    bench
+fn rig(baud: Baud) -> Rig {
+    let mut rig = Rig::set_up(Module::Do4, &[(configuration::BAUD, baud.code())]);
+    rig.tolerant = true;
+    rig.patience = Time::from_ms(1);
+    rig.write_bits(SLOT, &[true; 4]).unwrap();
+    rig.board.run_for(Time::from_ms(40));
+    rig
 }
 
 /// Returns the instants after the start of a request at which bits change: in the request, in t3.5, at the beginning,
 /// in the middle and at the end of the reply.
-fn instants(bench: &Bench) -> [Time; 6] {
-    let request = bench.characters(8);
-    let reply = request + bench.t35();
-    let half = |characters: u64| Time::from_ps(bench.characters(characters).as_ps() / 2);
+fn instants(rig: &Rig) -> [Time; 6] {
+    let request = rig.characters(8);
+    let reply = request + rig.t35();
+    let half = |characters: u64| Time::from_ps(rig.characters(characters).as_ps() / 2);
     [
         half(9),
         request + half(5),
@@ -124,30 +124,30 @@ fn instants(bench: &Bench) -> [Time; 6] {
     ]
 }
 
-/// Returns the duration of the longest reply at the bench's rate, plus the millisecond that the server may add, plus two
+/// Returns the duration of the longest reply at the rig's rate, plus the millisecond that the server may add, plus two
 /// tenths: clones of the part send a bit more for each character, and a tenth is in reserve.
-fn bound(bench: &Bench) -> Time {
-    let longest = bench.characters(256) + Time::from_ms(1);
+fn bound(rig: &Rig) -> Time {
+    let longest = rig.characters(256) + Time::from_ms(1);
     Time::from_ps(longest.as_ps() * 12 / 10)
 }
 
 /// Inverts bits of a register. The core's registers are written by an instruction of the core, which is put into
 /// unused memory of the stack.
-fn upset(bench: &mut Bench, (block, offset, _, name): Register, mask: u32) {
+fn upset(rig: &mut Rig, (block, offset, _, name): Register, mask: u32) {
     if let Some(block) = block {
-        bench.board.upset(block, offset, mask);
+        rig.board.upset(block, offset, mask);
         return;
     }
     /// `str r0, [r1]`
     const STORE: [u8; 2] = 0x6008_u16.to_le_bytes();
     const UNUSED: u32 = 0x2000_0000;
     let address = 0xE000_E000 + offset;
-    let read = |bench: &mut Bench| {
+    let read = |rig: &mut Rig| {
         let mut bytes = [0; 4];
-        assert_eq!(bench.board.read_memory(address, &mut bytes), 4);
+        assert_eq!(rig.board.read_memory(address, &mut bytes), 4);
         u32::from_le_bytes(bytes)
     };
-    let wanted = read(bench) ^ mask;
+    let wanted = read(rig) ^ mask;
     // A bit of ISER is cleared through ICER.
     let clears = name.starts_with("ISER") && wanted & mask == 0;
     let (address, value) = match (name.starts_with("ISER"), clears) {
@@ -155,68 +155,68 @@ fn upset(bench: &mut Bench, (block, offset, _, name): Register, mask: u32) {
         (true, false) => (address, mask),
         _ => (address, wanted),
     };
-    while bench.board.asleep() {
-        bench.board.run_for(Time::from_us(1));
+    while rig.board.asleep() {
+        rig.board.run_for(Time::from_us(1));
     }
-    let saved = [0, 1, 15, 16].map(|number| (number, bench.board.register(number).unwrap()));
-    let was = bench.board.patch_code(UNUSED, &STORE).unwrap();
+    let saved = [0, 1, 15, 16].map(|number| (number, rig.board.register(number).unwrap()));
+    let was = rig.board.patch_code(UNUSED, &STORE).unwrap();
     // Not within an IT block.
     let flags = saved[3].1 & !0x0600_FC00;
     for (number, value) in [(0, value), (1, address), (15, UNUSED), (16, flags)] {
-        bench.board.set_register(number, value).unwrap();
+        rig.board.set_register(number, value).unwrap();
     }
-    bench.board.step_instruction();
+    rig.board.step_instruction();
     for (number, value) in saved {
-        bench.board.set_register(number, value).unwrap();
+        rig.board.set_register(number, value).unwrap();
     }
-    bench.board.patch_code(UNUSED, &was).unwrap();
-    assert_eq!(read(bench), wanted, "{name} is inverted by {mask:#x}");
+    rig.board.patch_code(UNUSED, &was).unwrap();
+    assert_eq!(read(rig), wanted, "{name} is inverted by {mask:#x}");
 }
 
 /// Disturbs one bit `after` the start of a request, or of an idle line without a request. Returns what is wrong
 /// afterwards, if anything.
-fn fails(bench: &mut Bench, register: Register, bit: u32, after: Option<Time>) -> Option<String> {
+fn fails(rig: &mut Rig, register: Register, bit: u32, after: Option<Time>) -> Option<String> {
     let (.., name) = register;
-    let resets = bench.board.resets();
-    let repairs = bench.register(fault::LINE_REPAIRS);
-    bench.board.run_for(Time::from_us(u64::from(bit) * 37));
-    let begin = bench.board.now();
+    let resets = rig.board.resets();
+    let repairs = rig.register(fault::LINE_REPAIRS);
+    rig.board.run_for(Time::from_us(u64::from(bit) * 37));
+    let begin = rig.board.now();
     if let Some(after) = after {
-        bench.board.line().send(begin, &adu(&LONG));
-        bench.board.run_until(begin + after);
+        rig.board.line().send(begin, &adu(&LONG));
+        rig.board.run_until(begin + after);
     }
-    upset(bench, register, 1 << bit);
-    let upset = bench.board.now();
-    let most = bound(bench);
+    upset(rig, register, 1 << bit);
+    let upset = rig.board.now();
+    let most = bound(rig);
     // The checks find any register in 66 ms. The watchdog needs 1,200 ms, twice if tasks that run slowly prove it once more.
     let end = if may_restart(name, bit) { 2_500 } else { 110 };
     let end = upset + most.max(Time::from_ms(end));
-    while bench.board.now() < end && bench.board.resets() == resets {
-        bench.board.run_for(Time::from_us(250));
-        let now = bench.board.now();
-        let last = bench.board.line().driver_edges().next_back();
+    while rig.board.now() < end && rig.board.resets() == resets {
+        rig.board.run_for(Time::from_us(250));
+        let now = rig.board.now();
+        let last = rig.board.line().driver_edges().next_back();
         if last.is_some_and(|(at, on)| on && now > at + most) {
             return Some("the driver is on for too long".to_owned());
         }
     }
-    bench.board.line().take_received();
-    if bench.board.resets() != resets && may_restart(name, bit) {
-        bench.started();
-        let kind = bench.register(0x0260);
-        bench.write_bits(SLOT, &[true; 4]).unwrap();
+    rig.board.line().take_received();
+    if rig.board.resets() != resets && may_restart(name, bit) {
+        rig.started();
+        let kind = rig.register(0x0260);
+        rig.write_bits(SLOT, &[true; 4]).unwrap();
         return (kind != 3).then(|| format!("the fault is {kind}"));
     }
-    if bench.board.resets() != resets {
+    if rig.board.resets() != resets {
         return Some("a reset".to_owned());
     }
-    let reply = bench.exchange(&adu(&OUTPUTS));
+    let reply = rig.exchange(&adu(&OUTPUTS));
     if reply != adu(&ALL_ON) {
         return Some(format!("the reply is {reply:02X?}"));
     }
-    if (1..=4).any(|line| bench.board.channel(line) != Channel::Do { on: true }) {
+    if (1..=4).any(|line| rig.board.channel(line) != Channel::Do { on: true }) {
         return Some("an output is off".to_owned());
     }
-    let repairs = bench.register(fault::LINE_REPAIRS) - repairs;
+    let repairs = rig.register(fault::LINE_REPAIRS) - repairs;
     let varies = VARYING
         .iter()
         .any(|&(register, bits)| register == name && bits >> bit & 1 != 0);
@@ -230,10 +230,10 @@ fn fails(bench: &mut Bench, register: Register, bit: u32, after: Option<Time>) -
 }
 
 /// Disturbs every bit of the registers on an idle line, and at two of the instants, which differ from bit to bit.
-fn disturb(registers: &[Register], baud: Baud, instants: fn(&Bench) -> Vec<Time>) {
+fn disturb(registers: &[Register], baud: Baud, instants: fn(&Rig) -> Vec<Time>) {
     let mut failures = Vec::new();
-    let mut bench = bench(baud);
-    let instants = instants(&bench);
+    let mut rig = rig(baud);
+    let instants = instants(&rig);
     for &register in registers {
         let (_, _, bits, name) = register;
         for bit in (0..32).filter(|bit| bits >> bit & 1 != 0) {
@@ -242,9 +242,9 @@ fn disturb(registers: &[Register], baud: Baud, instants: fn(&Bench) -> Vec<Time>
                 .step_by(instants.len().div_ceil(2))
                 .take(instants.len().min(2));
             for after in [None].into_iter().chain(some.map(Some)) {
-                if let Some(failure) = fails(&mut bench, register, bit, after) {
+                if let Some(failure) = fails(&mut rig, register, bit, after) {
                     failures.push(format!("{baud:?} {name} bit {bit}, {after:?}: {failure}"));
-                    bench = self::bench(baud);
+                    rig = self::rig(baud);
                 }
             }
         }
@@ -259,32 +259,28 @@ fn disturb(registers: &[Register], baud: Baud, instants: fn(&Bench) -> Vec<Time>
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn any_bit_of_the_lines_registers_may_change_at_any_instant() {
-    disturb(&OF_LINE, Baud::B115200, |bench| instants(bench).to_vec());
+    disturb(&OF_LINE, Baud::B115200, |rig| instants(rig).to_vec());
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn any_bit_of_the_lines_registers_may_change_at_921600() {
-    disturb(&OF_LINE, Baud::B921600, |bench| {
-        instants(bench)[3..4].to_vec()
-    });
+    disturb(&OF_LINE, Baud::B921600, |rig| instants(rig)[3..4].to_vec());
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn any_bit_of_the_other_registers_may_change_at_any_instant() {
-    disturb(&OTHERS, Baud::B115200, |bench| {
-        instants(bench)[3..4].to_vec()
-    });
+    disturb(&OTHERS, Baud::B115200, |rig| instants(rig)[3..4].to_vec());
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn a_reply_whose_end_is_never_reported_is_cut_off() {
     for baud in [Baud::B9600, Baud::B115200, Baud::B921600] {
-        let mut bench = Bench::set_up(Module::Di4, &[(configuration::BAUD, baud.code())]);
-        stays_within_the_bound(&mut bench, |_| {});
-        bench.assert_answers(1);
+        let mut rig = Rig::set_up(Module::Di4, &[(configuration::BAUD, baud.code())]);
+        stays_within_the_bound(&mut rig, |_| {});
+        rig.assert_answers(1);
     }
 }
 
@@ -292,29 +288,29 @@ fn a_reply_whose_end_is_never_reported_is_cut_off() {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn a_reply_whose_end_is_never_reported_is_cut_off_by_the_second_clock_too() {
-    let mut bench = Bench::set_up(Module::Di4, &[]);
-    stays_within_the_bound(&mut bench, |bench| {
-        bench.board.upset(Block::Tim2, 0x00, 1);
+    let mut rig = Rig::set_up(Module::Di4, &[]);
+    stays_within_the_bound(&mut rig, |rig| {
+        rig.board.upset(Block::Tim2, 0x00, 1);
     });
-    bench.assert_answers(1);
+    rig.assert_answers(1);
 }
 
 /// Stops the transmitter in a reply, so that TC is never set. The driver must go off in time.
-fn stays_within_the_bound(bench: &mut Bench, more: impl FnOnce(&mut Bench)) {
-    bench.tolerant = true;
-    let now = bench.board.now();
-    bench.board.line().send(now, &adu(&[1, 2, 0, FIRST, 0, 4]));
-    while !bench.board.driver_enable() {
-        bench.board.run_for(Time::from_us(1));
+fn stays_within_the_bound(rig: &mut Rig, more: impl FnOnce(&mut Rig)) {
+    rig.tolerant = true;
+    let now = rig.board.now();
+    rig.board.line().send(now, &adu(&[1, 2, 0, FIRST, 0, 4]));
+    while !rig.board.driver_enable() {
+        rig.board.run_for(Time::from_us(1));
     }
-    let begin = bench.board.now();
-    let limit = begin + bound(bench);
-    bench.board.run_for(Time::from_us(5));
+    let begin = rig.board.now();
+    let limit = begin + bound(rig);
+    rig.board.run_for(Time::from_us(5));
     // Clear TE.
-    bench.board.upset(Block::Usart1, 0x0C, 1 << 3);
-    more(bench);
-    bench.board.run_until(limit);
-    assert!(!bench.board.driver_enable(), "the driver is off");
-    bench.board.run_for(Time::from_ms(10));
-    bench.board.line().take_received();
+    rig.board.upset(Block::Usart1, 0x0C, 1 << 3);
+    more(rig);
+    rig.board.run_until(limit);
+    assert!(!rig.board.driver_enable(), "the driver is off");
+    rig.board.run_for(Time::from_ms(10));
+    rig.board.line().take_received();
 }

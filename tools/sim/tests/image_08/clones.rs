@@ -8,8 +8,8 @@ use sim::line::Settings;
 use sim::periph::flash::Durations;
 use sim::{Board, Config, Corner, Module, Time};
 
-use crate::bench::{Bench, SLOT, adu, board, config, format};
 use crate::campaign::{Line, stored};
+use crate::rig::{Rig, SLOT, adu, board, config, format};
 use crate::saving::{SLOWEST, large};
 
 /// Longer than the page erase of any clone that is known.
@@ -24,52 +24,48 @@ fn made(mut config: Config, erase: Time) -> Board {
 }
 
 /// Returns a clone with a 4DO at this rate and format, with time to start.
-fn clone(baud: Baud, format_code: u16, settings: &[(u16, u16)]) -> Bench {
+fn clone(baud: Baud, format_code: u16, settings: &[(u16, u16)]) -> Rig {
     let line = [(BAUD, baud.code()), (FORMAT, format_code)];
     let config = config(Module::Do4, &[settings, &line].concat());
-    let mut bench = Bench::of(made(config, ERASE));
-    bench.settings(Settings {
+    let mut rig = Rig::of(made(config, ERASE));
+    rig.settings(Settings {
         baud: baud.bits_per_second(),
         format: format(format_code),
     });
     // The first start of all erases pages of the boot state.
-    bench.board.run_for(Time::from_ms(4_000));
-    bench
+    rig.board.run_for(Time::from_ms(4_000));
+    rig
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn saves_with_long_erases_cost_no_reset_no_output_and_no_frame() {
-    let mut bench = clone(Baud::B115200, 0, &large());
-    bench.patience = ERASE + Time::from_ms(10);
-    bench.write_bits(SLOT, &[true; 4]).unwrap();
-    (0..4).for_each(|pin| bench.board.watch_pin('A', pin));
-    let from = bench.board.now();
+    let mut rig = clone(Baud::B115200, 0, &large());
+    rig.patience = ERASE + Time::from_ms(10);
+    rig.write_bits(SLOT, &[true; 4]).unwrap();
+    (0..4).for_each(|pin| rig.board.watch_pin('A', pin));
+    let from = rig.board.now();
     for n in 0..12 {
-        bench.configure(FILTER, &[10 + n]);
-        bench.write(COMMAND, &[1]).unwrap();
-        let end = bench.board.now() + Time::from_ms(1_200);
+        rig.configure(FILTER, &[10 + n]);
+        rig.write(COMMAND, &[1]).unwrap();
+        let end = rig.board.now() + Time::from_ms(1_200);
         let mut longest = Time::ZERO;
-        while bench.board.now() < end {
-            let begin = bench.board.now();
-            let reply = bench.exchange(&adu(&[1, 1, 0, SLOT as u8, 0, 4]));
+        while rig.board.now() < end {
+            let begin = rig.board.now();
+            let reply = rig.exchange(&adu(&[1, 1, 0, SLOT as u8, 0, 4]));
             assert_eq!(reply, adu(&[1, 1, 1, 0x0F]), "save {n}");
-            longest = longest.max(bench.board.now() - begin);
+            longest = longest.max(rig.board.now() - begin);
         }
-        assert!(!bench.status(8), "save {n} is done");
+        assert!(!rig.status(8), "save {n} is done");
         // Every second save erases a page.
         assert_eq!(longest > Time::from_ms(300), n % 2 == 1, "{n}: {longest:?}");
     }
-    assert_eq!(bench.board.resets(), 0);
+    assert_eq!(rig.board.resets(), 0);
     for pin in 0..4 {
-        let edges = bench.board.pin_edges('A', pin).iter();
+        let edges = rig.board.pin_edges('A', pin).iter();
         assert_eq!(edges.filter(|edge| edge.0 >= from).count(), 0, "PA{pin}");
     }
-    assert_eq!(
-        bench.registers(0x0231, 1),
-        Ok(vec![0]),
-        "errors of the line"
-    );
+    assert_eq!(rig.registers(0x0231, 1), Ok(vec![0]), "errors of the line");
 }
 
 #[test]
@@ -96,10 +92,10 @@ fn update_with_long_erases_loses_no_poll_but_those_of_the_restart() {
 fn longest_replies_are_whole_at_every_rate() {
     // The limit counts bits: each rate has another format than those beside it.
     for (baud, format_code) in Baud::ALL.iter().zip((0..4).cycle()) {
-        let mut bench = clone(*baud, format_code, &[]);
-        let reply = bench.ask(1, &[3, 1, 0x60, 0, 125]).expect("a reply");
+        let mut rig = clone(*baud, format_code, &[]);
+        let reply = rig.ask(1, &[3, 1, 0x60, 0, 125]).expect("a reply");
         assert_eq!(reply.len(), 2 + 250, "{baud:?} {format_code}");
         let echo = [&[8, 0, 0][..], &[0xA5; 250]].concat();
-        assert_eq!(bench.ask(1, &echo), Some(echo), "{baud:?} {format_code}");
+        assert_eq!(rig.ask(1, &echo), Some(echo), "{baud:?} {format_code}");
     }
 }

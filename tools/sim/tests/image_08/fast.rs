@@ -4,8 +4,8 @@ use register_map::codes::Baud;
 use register_map::configuration::{BAUD, FILTER, FORMAT};
 use sim::{Board, Config, Module, Time};
 
-use crate::bench::{self, FIRST, PORT, config, corner};
 use crate::fast_master::Master;
+use crate::rig::{self, FIRST, PORT, config, corner};
 use crate::saving::{SLOWEST, large};
 
 /// A unit: its switch and the error of its crystal in ppm; `None` without a crystal.
@@ -31,7 +31,7 @@ fn board((dip, ppm): Unit, n: u8, stored: &[(u16, u16)]) -> Board {
         Some(ppm) => config.chip.crystal_hz = (8_000_000 + 8 * ppm) as u32,
         None => config.chip.crystal = false,
     }
-    bench::board(config)
+    rig::board(config)
 }
 
 #[test]

@@ -8,8 +8,8 @@ use register_map::links;
 use sim::line::{Format, Settings};
 use sim::{Module, Time};
 
-use crate::bench::Bench;
 use crate::fitted::{LINES, change, fitted, outputs};
+use crate::rig::Rig;
 use crate::saving::{SLOWEST, large};
 
 const MODULES: [Module; 4] = [Module::Do4, Module::Di4, Module::None, Module::Di4];
@@ -36,14 +36,14 @@ fn linked(action: LinkAction) -> Vec<(u16, u16)> {
 }
 
 /// Presses or releases a button. Returns the time in us until the output has changed, and its new level.
-fn press(bench: &mut Bench, (port, channel): (u8, usize), pressed: bool) -> Option<(u64, bool)> {
+fn press(rig: &mut Rig, (port, channel): (u8, usize), pressed: bool) -> Option<(u64, bool)> {
     let (line, pin) = LINES[0][3];
-    bench.board.watch_pin(line, pin);
-    let now = bench.board.now();
-    let set = change(bench, port, |slot| slot.set_energised(channel, pressed));
+    rig.board.watch_pin(line, pin);
+    let now = rig.board.now();
+    let set = change(rig, port, |slot| slot.set_energised(channel, pressed));
     set.unwrap();
-    bench.board.run_for(Time::from_ms(60));
-    let edges = bench.board.pin_edges(line, pin).iter();
+    rig.board.run_for(Time::from_ms(60));
+    let edges = rig.board.pin_edges(line, pin).iter();
     let edges: Vec<_> = edges.filter(|(at, _)| *at > now).collect();
     assert!(edges.len() <= 1, "the output has {} edges", edges.len());
     edges
@@ -54,16 +54,16 @@ fn press(bench: &mut Bench, (port, channel): (u8, usize), pressed: bool) -> Opti
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn a_lamp_with_two_buttons_changes_within_2_ms() {
-    let mut bench = fitted(MODULES, &linked(LinkAction::Toggle));
-    bench.board.run_for(READY);
+    let mut rig = fitted(MODULES, &linked(LinkAction::Toggle));
+    rig.board.run_for(READY);
     for n in 0..12 {
         // At any phase between two scans.
-        bench.board.run_for(Time::from_us(n * 137));
+        rig.board.run_for(Time::from_us(n * 137));
         let button = if n % 3 == 0 { (2, 1) } else { (4, 2) };
-        let (took, level) = press(&mut bench, button, true).unwrap();
+        let (took, level) = press(&mut rig, button, true).unwrap();
         assert!(ON_TIME.contains(&took), "{took} us");
         assert_eq!(level, n % 2 == 0);
-        assert_eq!(press(&mut bench, button, false), None);
+        assert_eq!(press(&mut rig, button, false), None);
     }
 }
 
@@ -72,11 +72,11 @@ fn a_lamp_with_two_buttons_changes_within_2_ms() {
 fn output_follows_within_2_ms_while_the_line_is_dead() {
     let mut settings = linked(LinkAction::FollowAlone);
     settings.push((COMM_TIMEOUT, 1));
-    let mut bench = fitted(MODULES, &settings);
-    bench.board.run_for(READY);
+    let mut rig = fitted(MODULES, &settings);
+    rig.board.run_for(READY);
     for n in 0..8 {
-        bench.board.run_for(Time::from_us(n * 137));
-        let (took, level) = press(&mut bench, (2, 1), n % 2 == 0).unwrap();
+        rig.board.run_for(Time::from_us(n * 137));
+        let (took, level) = press(&mut rig, (2, 1), n % 2 == 0).unwrap();
         assert!(ON_TIME.contains(&took), "{took} us");
         assert_eq!(level, n % 2 == 0);
     }
@@ -89,17 +89,17 @@ fn output_follows_at_most_an_erase_later_during_a_save() {
     let mut settings = large();
     settings.retain(|(address, _)| links.iter().all(|(own, _)| own != address));
     settings.extend(links);
-    let mut bench = fitted(MODULES, &settings);
-    bench.board.set_flash_durations(SLOWEST);
+    let mut rig = fitted(MODULES, &settings);
+    rig.board.set_flash_durations(SLOWEST);
     // START has switched the output on, until the inputs have values.
-    bench.board.run_for(READY);
-    press(&mut bench, (2, 1), true).unwrap();
+    rig.board.run_for(READY);
+    press(&mut rig, (2, 1), true).unwrap();
     let mut longest = 0;
     for n in 0..16 {
-        bench.configure(FILTER + 7, &[10 + n]);
-        bench.write(0x0108, &[1]).unwrap();
-        bench.board.run_for(Time::from_ms(u64::from(n) * 4));
-        let (took, _) = press(&mut bench, (2, 1), n % 2 == 1).unwrap();
+        rig.configure(FILTER + 7, &[10 + n]);
+        rig.write(0x0108, &[1]).unwrap();
+        rig.board.run_for(Time::from_ms(u64::from(n) * 4));
+        let (took, _) = press(&mut rig, (2, 1), n % 2 == 1).unwrap();
         assert!(took <= ON_TIME.end() + SLOWEST.erase.as_us(), "{took} us");
         longest = longest.max(took);
     }
@@ -107,9 +107,9 @@ fn output_follows_at_most_an_erase_later_during_a_save() {
 }
 
 /// Returns the edges of the output since the pin is watched.
-fn edges(bench: &Bench) -> usize {
+fn edges(rig: &Rig) -> usize {
     let (line, pin) = LINES[0][3];
-    bench.board.pin_edges(line, pin).len()
+    rig.board.pin_edges(line, pin).len()
 }
 
 #[test]
@@ -122,26 +122,26 @@ fn pin_of_a_held_output_has_no_edge_while_a_master_writes_the_opposite_nor_at_a_
             // SAFE is the opposite of what the link wants, too.
             settings.push((SAFE + LAMP, 1));
         }
-        let mut bench = fitted(MODULES, &settings);
-        bench.settings(Settings {
+        let mut rig = fitted(MODULES, &settings);
+        rig.settings(Settings {
             baud: 115_200,
             format: Format::N2,
         });
-        bench.board.run_for(READY);
-        let on = outputs(&bench, 1)[3];
+        rig.board.run_for(READY);
+        let on = outputs(&rig, 1)[3];
         assert_eq!(on, action == LinkAction::Invert);
         let (line, pin) = LINES[0][3];
-        bench.board.watch_pin(line, pin);
-        let before = edges(&bench);
-        let mut next = bench.board.now();
+        rig.board.watch_pin(line, pin);
+        let before = edges(&rig);
+        let mut next = rig.board.now();
         for n in 0..100 {
-            bench.write_bits(LAMP, &[!on]).unwrap();
+            rig.write_bits(LAMP, &[!on]).unwrap();
             // At any phase between two scans.
             next += Time::from_us(20_000 + n * 7);
-            bench.board.run_until(next);
+            rig.board.run_until(next);
         }
-        bench.board.run_for(Time::from_ms(1_000));
-        assert!(bench.status(1), "the watchdog has expired");
-        assert_eq!(edges(&bench), before, "{action:?}");
+        rig.board.run_for(Time::from_ms(1_000));
+        assert!(rig.status(1), "the watchdog has expired");
+        assert_eq!(edges(&rig), before, "{action:?}");
     }
 }

@@ -21,9 +21,6 @@ mod fitted;
 mod kept_outputs;
 mod links;
 
-#[allow(dead_code, reason = "other tests of the modio-02 use the rest")]
-#[path = "../image/bench.rs"]
-mod bench;
 #[path = "../image/boot.rs"]
 mod boot;
 #[path = "../image/campaign.rs"]
@@ -45,6 +42,9 @@ mod radio;
 #[allow(dead_code, reason = "other tests of the modio-02 use the rest")]
 #[path = "../image/registers.rs"]
 mod registers;
+#[allow(dead_code, reason = "other tests of the modio-02 use the rest")]
+#[path = "../image/rig.rs"]
+mod rig;
 #[path = "../image/saving.rs"]
 mod saving;
 #[allow(dead_code, reason = "other tests of the modio-02 use the rest")]

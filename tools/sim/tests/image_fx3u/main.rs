@@ -18,21 +18,21 @@ use sim::{Config, Time, chip};
 /// The board that the image is for.
 const LAYOUT: &Layout = &FX3U_24;
 
-#[allow(dead_code, reason = "tests of other boards use the rest")]
-#[path = "../image/bench.rs"]
-mod bench;
 #[allow(dead_code, reason = "the tests of the modio-08 use the rest")]
 #[path = "../image/fast_master.rs"]
 mod fast_master;
 #[allow(dead_code, reason = "tests of other boards use the rest")]
 #[path = "../image/registers.rs"]
 mod registers;
+#[allow(dead_code, reason = "tests of other boards use the rest")]
+#[path = "../image/rig.rs"]
+mod rig;
 mod rs232;
 #[path = "../image/timing.rs"]
 mod timing;
 
-use bench::{Bench, corner, file, flash_with_settings};
 use fast_master::Master;
+use rig::{Rig, corner, file, flash_with_settings};
 
 /// Points of the first channel of ports 5, 7 and 8.
 const Y0: u8 = 16;
@@ -47,65 +47,65 @@ fn board(settings: &[(u16, u16)]) -> Config {
     }
 }
 
-fn unit(settings: &[(u16, u16)]) -> Bench {
-    Bench::with(board(settings))
+fn unit(settings: &[(u16, u16)]) -> Rig {
+    Rig::with(board(settings))
 }
 
-fn set(bench: &mut Bench, name: &str, value: Value) {
-    bench.board.set_terminal(name, value).unwrap();
+fn set(rig: &mut Rig, name: &str, value: Value) {
+    rig.board.set_terminal(name, value).unwrap();
 }
 
-fn relay(bench: &Bench, name: &str) -> bool {
-    bench.board.terminals().get(name) == Some(Value::Relay(true))
+fn relay(rig: &Rig, name: &str) -> bool {
+    rig.board.terminals().get(name) == Some(Value::Relay(true))
 }
 
 /// Returns a reading of registers.
-fn words(bench: &mut Bench, first: u16, count: u16) -> Vec<u16> {
-    bench.words(3, first, count).expect("the registers exist")
+fn words(rig: &mut Rig, first: u16, count: u16) -> Vec<u16> {
+    rig.words(3, first, count).expect("the registers exist")
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn every_input_is_at_its_point() {
-    let mut bench = unit(&[]);
+    let mut rig = unit(&[]);
     let names = (0..8).chain(10..16).map(|n| format!("X{n}"));
     let inputs: Vec<_> = names.map(|name| (name, Value::Input(true))).collect();
-    let rest = bench.ask(1, &[2, 0, 0, 0, 16]).unwrap();
+    let rest = rig.ask(1, &[2, 0, 0, 0, 16]).unwrap();
     // A point is on while its pin is low: RUN is, and the 24 V are there.
     assert_eq!(rest, [2, 2, 0, 0b0100_0000]);
     for (point, (name, value)) in inputs.into_iter().enumerate() {
-        set(&mut bench, &name, value);
-        bench.board.run_for(Time::from_ms(10));
-        let reply = bench.ask(1, &[2, 0, 0, 0, 16]).unwrap();
+        set(&mut rig, &name, value);
+        rig.board.run_for(Time::from_ms(10));
+        let reply = rig.ask(1, &[2, 0, 0, 0, 16]).unwrap();
         let bits = u16::from_le_bytes([reply[2], reply[3]]);
         assert_eq!(bits, 1 << point | 1 << 14, "{name}");
-        set(&mut bench, &name, Value::Input(false));
+        set(&mut rig, &name, Value::Input(false));
     }
-    set(&mut bench, "RUN", Value::Switch(true));
-    set(&mut bench, "24V", Value::Supply(false));
-    bench.board.run_for(Time::from_ms(10));
-    assert_eq!(bench.ask(1, &[2, 0, 14, 0, 2]).unwrap(), [2, 1, 0b10]);
+    set(&mut rig, "RUN", Value::Switch(true));
+    set(&mut rig, "24V", Value::Supply(false));
+    rig.board.run_for(Time::from_ms(10));
+    assert_eq!(rig.ask(1, &[2, 0, 14, 0, 2]).unwrap(), [2, 1, 0b10]);
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn every_relay_is_at_its_point_and_missing_ones_are_exception_02() {
-    let mut bench = unit(&[]);
+    let mut rig = unit(&[]);
     let names = ["Y0", "Y1", "Y2", "Y3", "Y4", "Y5", "Y6", "Y7", "Y10", "Y11"];
     for (point, name) in (Y0..).zip(names) {
-        bench.ask(1, &[5, 0, point, 0xFF, 0]).unwrap();
-        bench.board.run_for(Time::from_ms(5));
+        rig.ask(1, &[5, 0, point, 0xFF, 0]).unwrap();
+        rig.board.run_for(Time::from_ms(5));
         for other in names {
-            assert_eq!(relay(&bench, other), other == name, "{name} {other}");
+            assert_eq!(relay(&rig, other), other == name, "{name} {other}");
         }
-        bench.ask(1, &[5, 0, point, 0, 0]).unwrap();
+        rig.ask(1, &[5, 0, point, 0, 0]).unwrap();
     }
     for point in [Y10 + 2, Y10 + 3] {
-        assert_eq!(bench.ask(1, &[5, 0, point, 0xFF, 0]).unwrap(), [0x85, 2]);
-        assert_eq!(bench.ask(1, &[1, 0, point, 0, 1]).unwrap(), [0x81, 2]);
+        assert_eq!(rig.ask(1, &[5, 0, point, 0xFF, 0]).unwrap(), [0x85, 2]);
+        assert_eq!(rig.ask(1, &[1, 0, point, 0, 1]).unwrap(), [0x81, 2]);
     }
     assert_eq!(
-        bench.ask(1, &[6, 1, 0x10, 0, 1]).unwrap(),
+        rig.ask(1, &[6, 1, 0x10, 0, 1]).unwrap(),
         [0x86, 2],
         "MODULE"
     );
@@ -114,12 +114,12 @@ fn every_relay_is_at_its_point_and_missing_ones_are_exception_02() {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn analog_inputs_measure_volts_and_milliamperes() {
-    let mut bench = unit(&[(FILTER + u16::from(AD0), 0)]);
+    let mut rig = unit(&[(FILTER + u16::from(AD0), 0)]);
     for (volts, milliamperes) in [(0, 0), (1_000, 4_000), (5_000, 10_000), (10_000, 20_000)] {
-        set(&mut bench, "AD0", Value::Voltage(volts));
-        set(&mut bench, "AD3", Value::Current(milliamperes));
-        bench.board.run_for(Time::from_ms(1_500));
-        let read = words(&mut bench, AD0.into(), 4);
+        set(&mut rig, "AD0", Value::Voltage(volts));
+        set(&mut rig, "AD3", Value::Current(milliamperes));
+        rig.board.run_for(Time::from_ms(1_500));
+        let read = words(&mut rig, AD0.into(), 4);
         // 12 bits of 10 V or 20 mA. Five codes are the tolerance of the converter at its full scale.
         for (code, part) in [
             (read[0], f64::from(volts) / 10e3),
@@ -138,12 +138,12 @@ fn analog_inputs_measure_volts_and_milliamperes() {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn analog_outputs_are_the_part_s_own_dac() {
-    let mut bench = unit(&[(0x0117, 6)]);
+    let mut rig = unit(&[(0x0117, 6)]);
     for code in [0, 410, 2048, 4095] {
         let [high, low] = u16::to_be_bytes(code);
-        assert_eq!(bench.ask(1, &[6, 0, AD0 + 3, high, low]).unwrap()[0], 6);
-        bench.board.run_for(Time::from_ms(20));
-        let Some(Value::Output(millivolts)) = bench.board.terminals().get("DA1") else {
+        assert_eq!(rig.ask(1, &[6, 0, AD0 + 3, high, low]).unwrap()[0], 6);
+        rig.board.run_for(Time::from_ms(20));
+        let Some(Value::Output(millivolts)) = rig.board.terminals().get("DA1") else {
             panic!("no output");
         };
         let expected = f64::from(code) / 4095.0 * 10_000.0;
@@ -155,24 +155,24 @@ fn analog_outputs_are_the_part_s_own_dac() {
 }
 
 /// Returns a board that was powered just now, with the loader in front of these bytes.
-fn loaded(flash: Vec<u8>) -> Bench {
-    let mut bench = Bench::cold(Config {
+fn loaded(flash: Vec<u8>) -> Rig {
+    let mut rig = Rig::cold(Config {
         chip: chip::Config::holding(flash),
         ..Config::default()
     });
     // The loader's reset after the check of an image.
-    bench.tolerant = true;
-    bench
+    rig.tolerant = true;
+    rig
 }
 
 /// Runs a board that was powered just now, and asserts that its line stays idle. While the part is in reset, for up to 4.5 ms
 /// after power-on (DS5792 table 11), and until the first instructions of the loader, the board's resistor switches the driver
 /// on, with an idle TX.
-fn assert_idle(bench: &mut Bench, time: Time) {
-    let begin = bench.board.now();
-    bench.board.run_for(time);
+fn assert_idle(rig: &mut Rig, time: Time) {
+    let begin = rig.board.now();
+    rig.board.run_for(time);
     let mut since = None;
-    for (at, on) in bench.board.line().driver_edges().collect::<Vec<_>>() {
+    for (at, on) in rig.board.line().driver_edges().collect::<Vec<_>>() {
         if let Some(since) = since.filter(|_| !on) {
             let reset = if since == begin {
                 Time::from_us(4_500)
@@ -188,7 +188,7 @@ fn assert_idle(bench: &mut Bench, time: Time) {
         since = on.then_some(at);
     }
     assert_eq!(since, None, "the driver is on");
-    assert_eq!(bench.board.line().take_received(), []);
+    assert_eq!(rig.board.line().take_received(), []);
 }
 
 #[test]
@@ -199,73 +199,73 @@ fn line_stays_idle_from_power_on_to_the_first_reply() {
     let image = fs::read(file("modio-a.image")).expect("the image can be read");
     let at = (slot - FLASH_BASE) as usize;
     flash[at..at + image.len()].copy_from_slice(&image);
-    let mut bench = loaded(flash);
-    assert_idle(&mut bench, Time::from_ms(4_500));
-    assert_eq!(bench.ask(1, &[2, 0, 0, 0, 1]).unwrap(), [2, 1, 0]);
+    let mut rig = loaded(flash);
+    assert_idle(&mut rig, Time::from_ms(4_500));
+    assert_eq!(rig.ask(1, &[2, 0, 0, 0, 1]).unwrap(), [2, 1, 0]);
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn line_stays_idle_without_a_valid_image() {
     let flash = vec![0xFF; LAYOUT.part.flash_size];
-    let mut bench = loaded(flash);
-    assert_idle(&mut bench, Time::from_secs(5));
+    let mut rig = loaded(flash);
+    assert_idle(&mut rig, Time::from_secs(5));
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn address_is_set_by_serial_number_and_kept() {
-    let mut bench = unit(&[]);
-    let serial = words(&mut bench, state::SERIAL_NUMBER, 2);
+    let mut rig = unit(&[]);
+    let serial = words(&mut rig, state::SERIAL_NUMBER, 2);
     let serial: Vec<u8> = serial.into_iter().flat_map(u16::to_be_bytes).collect();
     let [high, low] = UNIT_BY_SERIAL.to_be_bytes();
     let request = [&[0xFD, 0x46, 8][..], &serial, &[6, high, low, 0, 42]].concat();
-    let reply = bench.exchange(&bench::adu(&request));
+    let reply = rig.exchange(&rig::adu(&request));
     let expected = [&[0xFD, 0x46, 9][..], &serial, &[6, high, low, 0, 42]].concat();
     assert_eq!(
         reply.get(reply.len().saturating_sub(15)..),
-        Some(&bench::adu(&expected)[..])
+        Some(&rig::adu(&expected)[..])
     );
-    bench.assert_answers(42);
-    assert_eq!(bench.ask(1, &[2, 0, 0, 0, 1]), None);
+    rig.assert_answers(42);
+    assert_eq!(rig.ask(1, &[2, 0, 0, 0, 1]), None);
     assert_eq!(
-        bench.ask(42, &[6, high, low, 0, 43]).unwrap(),
+        rig.ask(42, &[6, high, low, 0, 43]).unwrap(),
         [0x86, 2],
         "to the unit address"
     );
-    bench.board.run_for(Time::from_ms(500));
-    bench.board.cycle();
-    bench.board.run_for(Time::from_ms(200));
-    bench.assert_answers(42);
+    rig.board.run_for(Time::from_ms(500));
+    rig.board.cycle();
+    rig.board.run_for(Time::from_ms(200));
+    rig.assert_answers(42);
     let [high, low] = UNIT.to_be_bytes();
-    assert_eq!(bench.ask(42, &[3, high, low, 0, 1]).unwrap(), [3, 2, 0, 42]);
+    assert_eq!(rig.ask(42, &[3, high, low, 0, 1]).unwrap(), [3, 2, 0, 42]);
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn run_switch_moved_twice_after_power_on_starts_recovery() {
-    let mut bench = Bench::with(board(&[(UNIT, 9), (0x0101, 192)]));
-    bench.tolerant = true;
+    let mut rig = Rig::with(board(&[(UNIT, 9), (0x0101, 192)]));
+    rig.tolerant = true;
     for on in [true, false] {
-        bench.board.run_for(Time::from_ms(500));
-        set(&mut bench, "RUN", Value::Switch(on));
+        rig.board.run_for(Time::from_ms(500));
+        set(&mut rig, "RUN", Value::Switch(on));
     }
-    bench.board.run_for(Time::from_ms(500));
-    bench.assert_answers(255);
+    rig.board.run_for(Time::from_ms(500));
+    rig.assert_answers(255);
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn button_switches_a_lamp_without_a_master() {
     let link = links::of_point(Y0.into(), false);
-    let mut bench = unit(&[(link, 0), (link + 1, LinkAction::Toggle.code())]);
+    let mut rig = unit(&[(link, 0), (link + 1, LinkAction::Toggle.code())]);
     // After a power-on no button is seen for a second.
-    bench.board.run_for(Time::from_ms(1_100));
+    rig.board.run_for(Time::from_ms(1_100));
     for lit in [true, false] {
         for pressed in [true, false] {
-            set(&mut bench, "X0", Value::Input(pressed));
-            bench.board.run_for(Time::from_ms(20));
-            assert_eq!(relay(&bench, "Y0"), lit);
+            set(&mut rig, "X0", Value::Input(pressed));
+            rig.board.run_for(Time::from_ms(20));
+            assert_eq!(relay(&rig, "Y0"), lit);
         }
     }
 }
@@ -279,7 +279,7 @@ fn scan_finds_units_whose_start_bits_are_seen_by_an_interrupt() {
             config.chip.corner = corner();
             config.chip.unique_id[11] = n;
             config.chip.crystal_hz = (8_000_000 + 8 * ppm) as u32;
-            bench::board(config)
+            rig::board(config)
         });
         let mut master = Master::new(baud, 0, units.collect());
         for _ in 0..5 {

@@ -46,16 +46,16 @@ impl Bus for Device {
 }
 
 /// The block and the bus, and a time that each register access moves on.
-struct Bench {
+struct Rig {
     i2c: I2c,
     device: Device,
     now: Time,
 }
 
-impl Bench {
+impl Rig {
     /// 400 kHz from 36 MHz: CCR = 30, three cycles each: 2.5 us a bit.
     fn new() -> Self {
-        let mut bench = Self {
+        let mut rig = Self {
             i2c: I2c::default(),
             device: Device {
                 present: true,
@@ -66,10 +66,10 @@ impl Bench {
             },
             now: Time::ZERO,
         };
-        bench.i2c.set_clock(HZ, Time::ZERO);
-        bench.i2c.set_connected(true, Time::ZERO);
-        bench.init();
-        bench
+        rig.i2c.set_clock(HZ, Time::ZERO);
+        rig.i2c.set_connected(true, Time::ZERO);
+        rig.init();
+        rig
     }
 
     fn init(&mut self) {
@@ -158,311 +158,309 @@ impl Bench {
 
 #[test]
 fn a_fast_write_takes_nine_bits_a_byte() {
-    let mut bench = Bench::new();
-    bench.send(&[0x0F, 0xFF, 0x01, 0x23]);
+    let mut rig = Rig::new();
+    rig.send(&[0x0F, 0xFF, 0x01, 0x23]);
     // Start, address, four bytes, stop.
-    assert_eq!(bench.now, Bench::bits(1 + 9 + 4 * 9 + 1));
-    assert_eq!(bench.read(offset::SR2), 0);
-    assert_eq!(bench.read(offset::SR1), 0);
+    assert_eq!(rig.now, Rig::bits(1 + 9 + 4 * 9 + 1));
+    assert_eq!(rig.read(offset::SR2), 0);
+    assert_eq!(rig.read(offset::SR1), 0);
 }
 
 #[test]
 fn flags_of_a_write_match_the_manual() {
-    let mut bench = Bench::new();
-    bench.set(cr1::START);
-    assert!(bench.wait(sr1::SB));
-    assert_eq!(bench.read(offset::SR2), sr2::MSL | sr2::BUSY);
-    bench.write(offset::DR, 0xC0);
-    assert!(bench.wait(sr1::ADDR));
-    assert_eq!(bench.read(offset::SR1), sr1::ADDR | sr1::TXE);
-    assert_eq!(bench.read(offset::SR2), sr2::MSL | sr2::BUSY | sr2::TRA);
+    let mut rig = Rig::new();
+    rig.set(cr1::START);
+    assert!(rig.wait(sr1::SB));
+    assert_eq!(rig.read(offset::SR2), sr2::MSL | sr2::BUSY);
+    rig.write(offset::DR, 0xC0);
+    assert!(rig.wait(sr1::ADDR));
+    assert_eq!(rig.read(offset::SR1), sr1::ADDR | sr1::TXE);
+    assert_eq!(rig.read(offset::SR2), sr2::MSL | sr2::BUSY | sr2::TRA);
     // The clock is stretched until a byte is written. The byte then moves directly to the shift register.
-    assert_eq!(bench.i2c.next_event(), None);
-    bench.write(offset::DR, 0x00);
-    assert_eq!(bench.read(offset::SR1), sr1::TXE);
-    bench.write(offset::DR, 0x10);
-    assert_eq!(bench.read(offset::SR1), 0);
-    assert!(bench.wait(sr1::TXE));
-    assert!(bench.wait(sr1::BTF));
-    assert_eq!(bench.read(offset::SR1), sr1::TXE | sr1::BTF);
+    assert_eq!(rig.i2c.next_event(), None);
+    rig.write(offset::DR, 0x00);
+    assert_eq!(rig.read(offset::SR1), sr1::TXE);
+    rig.write(offset::DR, 0x10);
+    assert_eq!(rig.read(offset::SR1), 0);
+    assert!(rig.wait(sr1::TXE));
+    assert!(rig.wait(sr1::BTF));
+    assert_eq!(rig.read(offset::SR1), sr1::TXE | sr1::BTF);
     // One more byte clears BTF.
-    bench.write(offset::DR, 0x00);
-    assert_eq!(bench.read(offset::SR1), sr1::TXE);
-    assert!(bench.wait(sr1::BTF));
-    bench.stop();
+    rig.write(offset::DR, 0x00);
+    assert_eq!(rig.read(offset::SR1), sr1::TXE);
+    assert!(rig.wait(sr1::BTF));
+    rig.stop();
 }
 
 #[test]
 fn an_absent_device_is_not_acknowledged() {
-    let mut bench = Bench::new();
-    bench.device.present = false;
-    bench.write(offset::CR2, 36 | cr2::ITERREN);
-    assert!(!bench.address(0xC0));
-    assert_eq!(bench.now, Bench::bits(10));
-    assert!(bench.i2c.irq_error());
-    bench.write(offset::SR1, !sr1::AF);
-    assert!(!bench.i2c.irq_error());
-    bench.stop();
-    assert_eq!(bench.read(offset::SR2), 0);
-    bench.device.present = true;
-    bench.send(&[0x01, 0x00]);
+    let mut rig = Rig::new();
+    rig.device.present = false;
+    rig.write(offset::CR2, 36 | cr2::ITERREN);
+    assert!(!rig.address(0xC0));
+    assert_eq!(rig.now, Rig::bits(10));
+    assert!(rig.i2c.irq_error());
+    rig.write(offset::SR1, !sr1::AF);
+    assert!(!rig.i2c.irq_error());
+    rig.stop();
+    assert_eq!(rig.read(offset::SR2), 0);
+    rig.device.present = true;
+    rig.send(&[0x01, 0x00]);
 }
 
 /// Reads `n` bytes the way the HAL's blocking driver does for 1, 2 and more.
-fn receive(bench: &mut Bench, n: usize) -> Vec<u8> {
-    assert!(bench.address(0xC1));
+fn receive(rig: &mut Rig, n: usize) -> Vec<u8> {
+    assert!(rig.address(0xC1));
     let mut bytes = Vec::new();
-    let mut take = |bench: &mut Bench| bytes.push(bench.read(offset::DR) as u8);
+    let mut take = |rig: &mut Rig| bytes.push(rig.read(offset::DR) as u8);
     match n {
         1 => {
-            bench.clear(cr1::ACK);
-            bench.clear_addr();
-            bench.set(cr1::STOP);
-            assert!(bench.wait(sr1::RXNE));
-            take(bench);
+            rig.clear(cr1::ACK);
+            rig.clear_addr();
+            rig.set(cr1::STOP);
+            assert!(rig.wait(sr1::RXNE));
+            take(rig);
         }
         2 => {
-            bench.set(cr1::POS | cr1::ACK);
-            bench.clear_addr();
-            bench.clear(cr1::ACK);
-            assert!(bench.wait(sr1::BTF));
-            bench.set(cr1::STOP);
-            take(bench);
-            take(bench);
+            rig.set(cr1::POS | cr1::ACK);
+            rig.clear_addr();
+            rig.clear(cr1::ACK);
+            assert!(rig.wait(sr1::BTF));
+            rig.set(cr1::STOP);
+            take(rig);
+            take(rig);
         }
         _ => {
-            bench.clear_addr();
+            rig.clear_addr();
             for _ in 0..n - 3 {
-                assert!(bench.wait(sr1::RXNE));
-                take(bench);
+                assert!(rig.wait(sr1::RXNE));
+                take(rig);
             }
-            assert!(bench.wait(sr1::BTF));
-            bench.clear(cr1::ACK);
-            take(bench);
-            bench.set(cr1::STOP);
-            take(bench);
-            assert!(bench.wait(sr1::RXNE));
-            take(bench);
+            assert!(rig.wait(sr1::BTF));
+            rig.clear(cr1::ACK);
+            take(rig);
+            rig.set(cr1::STOP);
+            take(rig);
+            assert!(rig.wait(sr1::RXNE));
+            take(rig);
         }
     }
-    bench.until_stopped();
-    bench.clear(cr1::POS);
-    bench.set(cr1::ACK);
+    rig.until_stopped();
+    rig.clear(cr1::POS);
+    rig.set(cr1::ACK);
     bytes
 }
 
 #[test]
 fn one_two_and_twenty_four_bytes_are_read_back() {
-    let mut bench = Bench::new();
+    let mut rig = Rig::new();
     for n in [1, 2, 3, 4, 24] {
-        let began = bench.now;
+        let began = rig.now;
         assert_eq!(
-            receive(&mut bench, n),
+            receive(&mut rig, n),
             Vec::from_iter(1..=n as u8),
             "{n} bytes"
         );
-        assert_eq!(bench.read(offset::SR1), 0);
-        assert_eq!(bench.read(offset::SR2), 0);
+        assert_eq!(rig.read(offset::SR1), 0);
+        assert_eq!(rig.read(offset::SR2), 0);
         // The program takes no time, so the clock is never stretched and the duration is exact to the bit.
         let bits = 1 + 9 + 9 * n as u64 + 1;
-        let off = (bench.now - began)
-            .as_ps()
-            .abs_diff(Bench::bits(bits).as_ps());
+        let off = (rig.now - began).as_ps().abs_diff(Rig::bits(bits).as_ps());
         assert!(off < 100, "{n} bytes: {off} ps");
     }
 }
 
 #[test]
 fn repeated_start_changes_the_direction() {
-    let mut bench = Bench::new();
-    assert!(bench.address(0xC0));
-    bench.clear_addr();
-    bench.write(offset::DR, 0x08);
-    assert!(bench.wait(sr1::BTF));
-    assert_eq!(bench.device.received, [0x08]);
-    assert_eq!(receive(&mut bench, 2), [1, 2]);
+    let mut rig = Rig::new();
+    assert!(rig.address(0xC0));
+    rig.clear_addr();
+    rig.write(offset::DR, 0x08);
+    assert!(rig.wait(sr1::BTF));
+    assert_eq!(rig.device.received, [0x08]);
+    assert_eq!(receive(&mut rig, 2), [1, 2]);
 }
 
 #[test]
 fn a_held_clock_stretches_and_goes_on() {
-    let mut bench = Bench::new();
-    assert!(bench.address(0xC0));
-    bench.clear_addr();
-    bench.write(offset::DR, 0x0F);
-    bench.device.held.scl = false;
-    assert!(!bench.wait(sr1::BTF), "nothing will happen");
-    bench.now += Time::from_ms(5);
-    bench.device.held.scl = true;
-    assert!(bench.wait(sr1::BTF));
-    bench.write(offset::DR, 0xFF);
-    assert!(bench.wait(sr1::BTF));
-    bench.stop();
-    assert_eq!(bench.device.received, [0x0F, 0xFF]);
+    let mut rig = Rig::new();
+    assert!(rig.address(0xC0));
+    rig.clear_addr();
+    rig.write(offset::DR, 0x0F);
+    rig.device.held.scl = false;
+    assert!(!rig.wait(sr1::BTF), "nothing will happen");
+    rig.now += Time::from_ms(5);
+    rig.device.held.scl = true;
+    assert!(rig.wait(sr1::BTF));
+    rig.write(offset::DR, 0xFF);
+    assert!(rig.wait(sr1::BTF));
+    rig.stop();
+    assert_eq!(rig.device.received, [0x0F, 0xFF]);
 }
 
 #[test]
 fn a_held_data_wire_keeps_the_bus_busy_until_it_is_clocked_free() {
-    let mut bench = Bench::new();
-    bench.device.held.sda = false;
-    bench.set(cr1::START);
-    assert!(!bench.wait(sr1::SB));
-    assert_eq!(bench.read(offset::SR2), sr2::BUSY);
+    let mut rig = Rig::new();
+    rig.device.held.sda = false;
+    rig.set(cr1::START);
+    assert!(!rig.wait(sr1::SB));
+    assert_eq!(rig.read(offset::SR2), sr2::BUSY);
     // A software reset alone does not help: the wire is still low.
-    bench.write(offset::CR1, cr1::PE | cr1::SWRST);
-    bench.write(offset::CR1, 0);
-    bench.init();
-    assert_eq!(bench.read(offset::SR2), sr2::BUSY);
+    rig.write(offset::CR1, cr1::PE | cr1::SWRST);
+    rig.write(offset::CR1, 0);
+    rig.init();
+    assert_eq!(rig.read(offset::SR2), sr2::BUSY);
     // Nine pulses by hand, after which the device releases SDA, then a stop condition by hand: SDA rises while SCL is
     // high.
     for scl in [false, true].into_iter().cycle().take(18) {
-        bench.device.pins = Wires { scl, sda: true };
-        bench.read(offset::SR2);
+        rig.device.pins = Wires { scl, sda: true };
+        rig.read(offset::SR2);
     }
-    bench.device.held.sda = true;
+    rig.device.held.sda = true;
     for (scl, sda) in [(false, true), (false, false), (true, false), (true, true)] {
-        bench.device.pins = Wires { scl, sda };
-        bench.read(offset::SR2);
+        rig.device.pins = Wires { scl, sda };
+        rig.read(offset::SR2);
     }
-    assert_eq!(bench.read(offset::SR2), 0);
-    bench.send(&[0x02, 0x00]);
+    assert_eq!(rig.read(offset::SR2), 0);
+    rig.send(&[0x02, 0x00]);
 }
 
 #[test]
 fn a_pulse_on_the_clock_leaves_busy_that_only_a_reset_clears() {
-    let mut bench = Bench::new();
-    bench.device.held.scl = false;
-    bench.read(offset::SR1);
-    bench.device.held.scl = true;
-    assert_eq!(bench.read(offset::SR2), sr2::BUSY);
-    bench.set(cr1::START);
-    assert!(!bench.wait(sr1::SB));
-    bench.write(offset::CR1, cr1::PE | cr1::SWRST);
-    bench.write(offset::CR1, 0);
-    bench.init();
-    bench.send(&[0x02, 0x00]);
+    let mut rig = Rig::new();
+    rig.device.held.scl = false;
+    rig.read(offset::SR1);
+    rig.device.held.scl = true;
+    assert_eq!(rig.read(offset::SR2), sr2::BUSY);
+    rig.set(cr1::START);
+    assert!(!rig.wait(sr1::SB));
+    rig.write(offset::CR1, cr1::PE | cr1::SWRST);
+    rig.write(offset::CR1, 0);
+    rig.init();
+    rig.send(&[0x02, 0x00]);
 }
 
 #[test]
 fn a_data_wire_pulled_low_in_mid_byte_loses_arbitration() {
-    let mut bench = Bench::new();
-    assert!(bench.address(0xC0));
-    bench.clear_addr();
-    bench.write(offset::DR, 0x0F);
-    bench.device.held.sda = false;
-    assert!(bench.wait(sr1::ARLO));
-    assert_eq!(bench.read(offset::SR2), sr2::BUSY);
-    assert_eq!(bench.device.received, []);
+    let mut rig = Rig::new();
+    assert!(rig.address(0xC0));
+    rig.clear_addr();
+    rig.write(offset::DR, 0x0F);
+    rig.device.held.sda = false;
+    assert!(rig.wait(sr1::ARLO));
+    assert_eq!(rig.read(offset::SR2), sr2::BUSY);
+    assert_eq!(rig.device.received, []);
 }
 
 #[test]
 fn interrupts_follow_their_enables() {
-    let mut bench = Bench::new();
-    bench.write(offset::CR2, 36 | cr2::ITEVTEN);
-    bench.set(cr1::START);
-    assert!(bench.wait(sr1::SB));
-    assert!(bench.i2c.irq_event() && !bench.i2c.irq_error());
-    bench.write(offset::DR, 0xC0);
-    assert!(!bench.i2c.irq_event());
-    assert!(bench.wait(sr1::ADDR));
-    bench.clear_addr();
-    assert!(!bench.i2c.irq_event(), "TXE needs ITBUFEN");
-    bench.write(offset::CR2, 36 | cr2::ITEVTEN | cr2::ITBUFEN);
-    assert!(bench.i2c.irq_event());
+    let mut rig = Rig::new();
+    rig.write(offset::CR2, 36 | cr2::ITEVTEN);
+    rig.set(cr1::START);
+    assert!(rig.wait(sr1::SB));
+    assert!(rig.i2c.irq_event() && !rig.i2c.irq_error());
+    rig.write(offset::DR, 0xC0);
+    assert!(!rig.i2c.irq_event());
+    assert!(rig.wait(sr1::ADDR));
+    rig.clear_addr();
+    assert!(!rig.i2c.irq_event(), "TXE needs ITBUFEN");
+    rig.write(offset::CR2, 36 | cr2::ITEVTEN | cr2::ITBUFEN);
+    assert!(rig.i2c.irq_event());
 }
 
 #[test]
 fn misuse_is_reported() {
-    let mut bench = Bench::new();
-    assert!(bench.try_write(offset::CCR, 180).is_err(), "PE = 1");
-    assert!(bench.try_write(offset::CR1, ON | cr1::STOP).is_err());
-    assert!(bench.try_write(offset::DR, 0).is_err());
-    assert!(bench.try_write(offset::CR2, 36 | 1 << 11).is_err(), "DMA");
-    assert!(bench.try_write(offset::CR1, ON | 2).is_err(), "SMBus");
-    bench.write(offset::CR1, ON);
-    bench.set(cr1::START);
-    assert!(bench.try_write(offset::CR1, ON).is_err(), "START pending");
-    assert!(bench.read(0x20) == 11 && bench.i2c.read(0x24, Time::ZERO).is_err());
+    let mut rig = Rig::new();
+    assert!(rig.try_write(offset::CCR, 180).is_err(), "PE = 1");
+    assert!(rig.try_write(offset::CR1, ON | cr1::STOP).is_err());
+    assert!(rig.try_write(offset::DR, 0).is_err());
+    assert!(rig.try_write(offset::CR2, 36 | 1 << 11).is_err(), "DMA");
+    assert!(rig.try_write(offset::CR1, ON | 2).is_err(), "SMBus");
+    rig.write(offset::CR1, ON);
+    rig.set(cr1::START);
+    assert!(rig.try_write(offset::CR1, ON).is_err(), "START pending");
+    assert!(rig.read(0x20) == 11 && rig.i2c.read(0x24, Time::ZERO).is_err());
     for (cr2, ccr) in [(8, 180), (36, 3), (36, 179), (36, ccr::FAST | 29)] {
-        let mut bench = Bench::new();
-        bench.write(offset::CR1, 0);
-        bench.write(offset::CR2, cr2);
-        bench.write(offset::CCR, ccr);
-        assert!(bench.try_write(offset::CR1, ON).is_err(), "{cr2} {ccr}");
+        let mut rig = Rig::new();
+        rig.write(offset::CR1, 0);
+        rig.write(offset::CR2, cr2);
+        rig.write(offset::CCR, ccr);
+        assert!(rig.try_write(offset::CR1, ON).is_err(), "{cr2} {ccr}");
     }
 }
 
 #[test]
 fn transfer_starts_only_once_the_pins_are_configured() {
-    let mut bench = Bench::new();
-    bench.i2c.set_connected(false, bench.now);
-    let cr1 = bench.read(offset::CR1);
-    assert!(bench.try_write(offset::CR1, cr1 | cr1::START).is_err());
-    assert!(!bench.wait(sr1::SB));
-    bench.i2c.set_connected(true, bench.now);
-    assert!(bench.wait(sr1::SB));
+    let mut rig = Rig::new();
+    rig.i2c.set_connected(false, rig.now);
+    let cr1 = rig.read(offset::CR1);
+    assert!(rig.try_write(offset::CR1, cr1 | cr1::START).is_err());
+    assert!(!rig.wait(sr1::SB));
+    rig.i2c.set_connected(true, rig.now);
+    assert!(rig.wait(sr1::SB));
 }
 
 #[test]
 fn byte_stands_still_while_the_pins_are_not_the_block_s() {
-    let mut bench = Bench::new();
-    bench.set(cr1::START);
-    assert!(bench.wait(sr1::SB));
-    bench.write(offset::DR, 0xC0);
-    bench.i2c.set_connected(false, bench.now);
-    assert!(!bench.wait(sr1::ADDR | sr1::AF));
-    bench.i2c.set_connected(true, bench.now);
-    assert!(bench.wait(sr1::ADDR));
+    let mut rig = Rig::new();
+    rig.set(cr1::START);
+    assert!(rig.wait(sr1::SB));
+    rig.write(offset::DR, 0xC0);
+    rig.i2c.set_connected(false, rig.now);
+    assert!(!rig.wait(sr1::ADDR | sr1::AF));
+    rig.i2c.set_connected(true, rig.now);
+    assert!(rig.wait(sr1::ADDR));
 }
 
 /// Drives the wires by hand, with the pins as outputs.
-fn by_hand(bench: &mut Bench, scl: bool, sda: bool) {
-    bench.device.pins = Wires { scl, sda };
-    bench.i2c.exchange(&mut bench.device, bench.now);
+fn by_hand(rig: &mut Rig, scl: bool, sda: bool) {
+    rig.device.pins = Wires { scl, sda };
+    rig.i2c.exchange(&mut rig.device, rig.now);
 }
 
 #[test]
 fn locked_filters_keep_busy_set_until_edges_on_both_wires_and_a_software_reset() {
-    let mut bench = Bench::new();
-    bench.i2c.lock_filters(bench.now);
-    let busy = |bench: &mut Bench| bench.read(offset::SR2) & sr2::BUSY != 0;
-    let reset = |bench: &mut Bench| {
-        bench.write(offset::CR1, cr1::SWRST);
-        bench.write(offset::CR1, 0);
-        bench.init();
+    let mut rig = Rig::new();
+    rig.i2c.lock_filters(rig.now);
+    let busy = |rig: &mut Rig| rig.read(offset::SR2) & sr2::BUSY != 0;
+    let reset = |rig: &mut Rig| {
+        rig.write(offset::CR1, cr1::SWRST);
+        rig.write(offset::CR1, 0);
+        rig.init();
     };
-    assert!(busy(&mut bench));
-    bench.i2c.reset(bench.now);
-    reset(&mut bench);
-    assert!(busy(&mut bench), "no reset helps");
-    bench.set(cr1::START);
-    assert!(!bench.wait(sr1::SB));
-    by_hand(&mut bench, false, true);
-    by_hand(&mut bench, true, true);
-    reset(&mut bench);
-    assert!(busy(&mut bench), "SDA had no edge");
-    by_hand(&mut bench, true, false);
-    by_hand(&mut bench, true, true);
-    assert!(busy(&mut bench), "only a software reset clears it");
-    reset(&mut bench);
-    assert!(!busy(&mut bench));
-    bench.set(cr1::START);
-    assert!(bench.wait(sr1::SB));
+    assert!(busy(&mut rig));
+    rig.i2c.reset(rig.now);
+    reset(&mut rig);
+    assert!(busy(&mut rig), "no reset helps");
+    rig.set(cr1::START);
+    assert!(!rig.wait(sr1::SB));
+    by_hand(&mut rig, false, true);
+    by_hand(&mut rig, true, true);
+    reset(&mut rig);
+    assert!(busy(&mut rig), "SDA had no edge");
+    by_hand(&mut rig, true, false);
+    by_hand(&mut rig, true, true);
+    assert!(busy(&mut rig), "only a software reset clears it");
+    reset(&mut rig);
+    assert!(!busy(&mut rig));
+    rig.set(cr1::START);
+    assert!(rig.wait(sr1::SB));
 }
 
 #[test]
 fn start_condition_of_another_is_a_bus_error_in_a_byte_and_busy_on_a_free_bus() {
-    let mut bench = Bench::new();
-    bench.i2c.disturb();
-    assert_eq!(bench.read(offset::SR2), sr2::BUSY);
-    bench.write(offset::CR1, cr1::SWRST);
-    bench.write(offset::CR1, 0);
-    bench.init();
-    bench.set(cr1::START);
-    assert!(bench.wait(sr1::SB));
-    bench.write(offset::DR, 0xC0);
-    bench.i2c.disturb();
-    assert_eq!(bench.read(offset::SR1), sr1::BERR);
-    assert!(bench.wait(sr1::ADDR), "the transfer goes on");
-    bench.write(offset::SR1, !sr1::BERR & 0xFFFF);
-    assert_eq!(bench.read(offset::SR1) & sr1::BERR, 0);
+    let mut rig = Rig::new();
+    rig.i2c.disturb();
+    assert_eq!(rig.read(offset::SR2), sr2::BUSY);
+    rig.write(offset::CR1, cr1::SWRST);
+    rig.write(offset::CR1, 0);
+    rig.init();
+    rig.set(cr1::START);
+    assert!(rig.wait(sr1::SB));
+    rig.write(offset::DR, 0xC0);
+    rig.i2c.disturb();
+    assert_eq!(rig.read(offset::SR1), sr1::BERR);
+    assert!(rig.wait(sr1::ADDR), "the transfer goes on");
+    rig.write(offset::SR1, !sr1::BERR & 0xFFFF);
+    assert_eq!(rig.read(offset::SR1) & sr1::BERR, 0);
 }

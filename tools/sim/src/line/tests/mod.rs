@@ -21,31 +21,31 @@ const RXNE: u32 = 1 << 5;
 /// A tick of the baud generator after the idle frame that the transmitter sends first.
 const TICK: Time = Time::cycles(116 * 625, HZ);
 
-struct Bench {
+struct Rig {
     line: Line,
     usart: Usart,
     now: Time,
 }
 
-impl Bench {
+impl Rig {
     /// Returns both ends at 115200 8N2, after the first idle frame of the USART.
     fn new() -> Self {
-        let mut bench = Self {
+        let mut rig = Self {
             line: Line::default(),
             usart: Usart::default(),
             now: Time::ZERO,
         };
-        bench.line.set_settings(Settings {
+        rig.line.set_settings(Settings {
             baud: 115_200,
             format: Format::N2,
         });
-        bench.usart.set_clock(HZ, Time::ZERO);
-        bench.line.set_tx_pin(TxPin::Usart, Time::ZERO);
+        rig.usart.set_clock(HZ, Time::ZERO);
+        rig.line.set_tx_pin(TxPin::Usart, Time::ZERO);
         for (offset, value) in [(0x08, BRR), (0x10, 2 << 12), (CR1, ON)] {
-            bench.write(offset, value);
+            rig.write(offset, value);
         }
-        bench.run_to(TICK);
-        bench
+        rig.run_to(TICK);
+        rig
     }
 
     fn run_to(&mut self, at: Time) {
@@ -104,16 +104,16 @@ impl Bench {
 
 #[test]
 fn request_and_answer_are_received_and_recorded() {
-    let mut bench = Bench::new();
+    let mut rig = Rig::new();
     let request = [0x11, 0x01, 0x00, 0x13, 0x00, 0x25, 0x0E, 0x84];
     let sent = Time::from_ms(2);
-    let end = bench.line.send(sent, &request);
+    let end = rig.line.send(sent, &request);
     assert_eq!(end, sent + Time::cycles(88, 115_200));
-    assert_eq!(bench.receive(end + Time::from_us(1750)), request);
-    let done = bench.answer(&request[..4]);
+    assert_eq!(rig.receive(end + Time::from_us(1750)), request);
+    let done = rig.answer(&request[..4]);
     let began = done - Time::cycles(4 * 11 * 625, HZ);
-    bench.run_to(done + Time::from_us(1751));
-    let frames: Vec<_> = bench.line.frames().cloned().collect();
+    rig.run_to(done + Time::from_us(1751));
+    let frames: Vec<_> = rig.line.frames().cloned().collect();
     assert_eq!(frames.len(), 2);
     assert_eq!(
         (frames[0].start, frames[0].direction),
@@ -127,31 +127,31 @@ fn request_and_answer_are_received_and_recorded() {
     );
     assert_eq!(frames[1].bytes, request[..4]);
     assert!(!frames[1].damaged);
-    let received: Vec<_> = bench.line.received().map(|r| r.byte).collect();
+    let received: Vec<_> = rig.line.received().map(|r| r.byte).collect();
     assert_eq!(received, request[..4]);
-    assert!(bench.line.received().all(Received::is_good));
+    assert!(rig.line.received().all(Received::is_good));
     assert_eq!(
-        bench.line.driver_edges().collect::<Vec<_>>(),
+        rig.line.driver_edges().collect::<Vec<_>>(),
         [(began, true), (done, false)]
     );
-    assert_eq!(bench.line.collisions().count(), 0);
-    assert_eq!(bench.line.take_findings(), []);
+    assert_eq!(rig.line.collisions().count(), 0);
+    assert_eq!(rig.line.take_findings(), []);
 }
 
 #[test]
 fn one_large_step_has_the_same_result_as_many_small_steps() {
     let run = |steps: u64| {
-        let mut bench = Bench::new();
-        let end = bench.line.send(Time::from_ms(2), &[1, 2, 3]);
+        let mut rig = Rig::new();
+        let end = rig.line.send(Time::from_ms(2), &[1, 2, 3]);
         for n in 1..=steps {
             let at = Time::from_ms(2) + (end - Time::from_ms(2)) * n;
-            bench.run_to(Time::from_ps(at.as_ps() / steps).max(bench.now));
+            rig.run_to(Time::from_ps(at.as_ps() / steps).max(rig.now));
         }
-        bench.run_to(Time::from_ms(9));
+        rig.run_to(Time::from_ms(9));
         (
-            bench.read(SR),
-            bench.read(DR),
-            bench.line.frames().cloned().collect::<Vec<_>>(),
+            rig.read(SR),
+            rig.read(DR),
+            rig.line.frames().cloned().collect::<Vec<_>>(),
         )
     };
     let (sr, dr, frames) = run(0);
@@ -164,118 +164,118 @@ fn one_large_step_has_the_same_result_as_many_small_steps() {
 #[test]
 fn unit_receives_its_echo_only_with_set_echo() {
     for echo in [false, true] {
-        let mut bench = Bench::new();
-        bench.line.set_echo(echo);
-        bench.answer(&[0xA5]);
-        assert_eq!(bench.read(SR) & RXNE != 0, echo);
+        let mut rig = Rig::new();
+        rig.line.set_echo(echo);
+        rig.answer(&[0xA5]);
+        assert_eq!(rig.read(SR) & RXNE != 0, echo);
         if echo {
-            assert_eq!(bench.read(DR), 0xA5);
+            assert_eq!(rig.read(DR), 0xA5);
         }
     }
 }
 
 #[test]
 fn tim1_captures_falling_edges_of_received_characters() {
-    let mut bench = Bench::new();
+    let mut rig = Rig::new();
     let mut tim1 = Timer::new(Kind::Advanced);
     tim1.set_clock(HZ, Time::ZERO);
     let ok = Ok(());
     assert_eq!(tim1.write(0x1C, 1, Time::ZERO), ok);
     assert_eq!(tim1.write(0x20, 3 << 8, Time::ZERO), ok);
     assert_eq!(tim1.write(0x00, 1, Time::ZERO), ok);
-    let mut flags = |bench: &mut Bench, clear: bool| {
-        bench.usart.exchange(&mut bench.line, bench.now);
-        for (at, rising) in bench.usart.take_edges() {
+    let mut flags = |rig: &mut Rig, clear: bool| {
+        rig.usart.exchange(&mut rig.line, rig.now);
+        for (at, rising) in rig.usart.take_edges() {
             tim1.capture_edge(3, at, rising);
         }
-        tim1.advance(bench.now);
-        let sr = tim1.read(0x10, bench.now).expect("modelled") & 0x808;
+        tim1.advance(rig.now);
+        let sr = tim1.read(0x10, rig.now).expect("modelled") & 0x808;
         if clear {
-            assert_eq!(tim1.write(0x10, 0, bench.now), Ok(()));
+            assert_eq!(tim1.write(0x10, 0, rig.now), Ok(()));
         }
         sr
     };
-    flags(&mut bench, true);
-    let end = bench.line.send(Time::from_ms(2), &[0xFF, 0x55]);
-    bench.run_to(Time::from_ms(2) - Time::from_ps(1));
-    assert_eq!(flags(&mut bench, true), 0);
-    bench.run_to(Time::from_ms(2));
-    assert_eq!(flags(&mut bench, true), 1 << 3);
+    flags(&mut rig, true);
+    let end = rig.line.send(Time::from_ms(2), &[0xFF, 0x55]);
+    rig.run_to(Time::from_ms(2) - Time::from_ps(1));
+    assert_eq!(flags(&mut rig, true), 0);
+    rig.run_to(Time::from_ms(2));
+    assert_eq!(flags(&mut rig, true), 1 << 3);
     // The second start bit and four more falling edges: capture and overcapture.
-    bench.run_to(end);
-    assert_eq!(flags(&mut bench, true), 1 << 3 | 1 << 11);
-    bench.run_to(end + Time::from_ms(1));
-    assert_eq!(flags(&mut bench, true), 0);
+    rig.run_to(end);
+    assert_eq!(flags(&mut rig, true), 1 << 3 | 1 << 11);
+    rig.run_to(end + Time::from_ms(1));
+    assert_eq!(flags(&mut rig, true), 0);
     // Characters of the unit itself are not on its RX pin.
-    bench.answer(&[0x00]);
-    assert_eq!(flags(&mut bench, true), 0);
+    rig.answer(&[0x00]);
+    assert_eq!(flags(&mut rig, true), 0);
 }
 
 #[test]
 fn following_master_takes_over_the_units_settings() {
-    let mut bench = Bench::new();
-    bench.line.set_settings(Settings::default());
-    bench.run_to(Time::from_ms(2));
-    assert_eq!(bench.line.settings(), Settings::default());
-    bench.line.set_follow(true);
-    let end = bench.line.send(bench.now, &[0x55]);
+    let mut rig = Rig::new();
+    rig.line.set_settings(Settings::default());
+    rig.run_to(Time::from_ms(2));
+    assert_eq!(rig.line.settings(), Settings::default());
+    rig.line.set_follow(true);
+    let end = rig.line.send(rig.now, &[0x55]);
     // The master keeps its settings until it has sent its queue.
-    bench.run_to(end - Time::from_ps(1));
-    assert_eq!(bench.line.settings(), Settings::default());
-    bench.run_to(end);
+    rig.run_to(end - Time::from_ps(1));
+    assert_eq!(rig.line.settings(), Settings::default());
+    rig.run_to(end);
     let settings = Settings {
         baud: 115_200,
         format: Format::N2,
     };
-    assert_eq!(bench.line.settings(), settings);
+    assert_eq!(rig.line.settings(), settings);
     // 921600 bit/s from 72 MHz: 78 cycles are 923077 bit/s. With even parity.
-    bench.write(0x10, 0);
-    bench.write(0x08, 78);
-    bench.write(CR1, ON | 1 << 12 | 1 << 10);
-    bench.run_to(Time::from_ms(9));
+    rig.write(0x10, 0);
+    rig.write(0x08, 78);
+    rig.write(CR1, ON | 1 << 12 | 1 << 10);
+    rig.run_to(Time::from_ms(9));
     let settings = Settings {
         baud: 921_600,
         format: Format::E1,
     };
-    assert_eq!(bench.line.settings(), settings);
+    assert_eq!(rig.line.settings(), settings);
     // An unusual rate is taken over as it is. A format that no Modbus line has changes nothing.
-    bench.write(0x08, 1000);
-    bench.run_to(Time::from_ms(10));
-    assert_eq!(bench.line.settings().baud, 72_000);
+    rig.write(0x08, 1000);
+    rig.run_to(Time::from_ms(10));
+    assert_eq!(rig.line.settings().baud, 72_000);
     // Nine data bits, no parity.
-    bench.write(CR1, ON | 1 << 12);
-    bench.run_to(Time::from_ms(11));
-    assert_eq!(bench.line.settings().format, Format::E1);
+    rig.write(CR1, ON | 1 << 12);
+    rig.run_to(Time::from_ms(11));
+    assert_eq!(rig.line.settings().format, Format::E1);
     // A parity bit in words of eight bits: seven data bits.
     for (parity, format) in [(0, Format::SevenE1), (1 << 9, Format::SevenO1)] {
-        bench.write(CR1, ON | 1 << 10 | parity);
-        let now = bench.line.now;
-        bench.run_to(now + Time::from_ms(1));
-        assert_eq!(bench.line.settings().format, format);
+        rig.write(CR1, ON | 1 << 10 | parity);
+        let now = rig.line.now;
+        rig.run_to(now + Time::from_ms(1));
+        assert_eq!(rig.line.settings().format, format);
     }
 }
 
 #[test]
 fn memory_is_bounded_in_a_long_run() {
-    let mut bench = Bench::new();
+    let mut rig = Rig::new();
     for n in 0..20_000_u64 {
         let at = Time::from_ms(2 + 3 * n);
-        let end = bench.line.send(at, &[0x55, 0xAA, n as u8]);
-        bench.run_to(end);
-        bench.write(DR, 0x55);
+        let end = rig.line.send(at, &[0x55, 0xAA, n as u8]);
+        rig.run_to(end);
+        rig.write(DR, 0x55);
     }
-    assert_eq!(bench.line.frames().count(), KEPT);
-    let (from_master, from_unit) = bench.line.frame_counts();
+    assert_eq!(rig.line.frames().count(), KEPT);
+    let (from_master, from_unit) = rig.line.frame_counts();
     assert_eq!((from_master, from_unit), (19_999, 0));
     let waves = [
-        &bench.line.bus,
-        &bench.line.usart,
-        &bench.line.master.wave,
-        &bench.line.unit,
+        &rig.line.bus,
+        &rig.line.usart,
+        &rig.line.master.wave,
+        &rig.line.unit,
     ];
     assert!(
         waves.iter().all(|wave| wave.len() < 2500),
         "a wave keeps more than 100 ms"
     );
-    assert!(bench.line.master.sending.len() < 3);
+    assert!(rig.line.master.sending.len() < 3);
 }

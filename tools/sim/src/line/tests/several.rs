@@ -5,7 +5,7 @@ use super::*;
 /// Returns the time and value of the byte that another unit receives, and the same for the master. The other unit gets
 /// the edges `late` after the start bit.
 fn received(byte: u8, late: Time) -> [Vec<(Time, u8)>; 2] {
-    let (mut sender, mut listener) = (Bench::new(), Bench::new());
+    let (mut sender, mut listener) = (Rig::new(), Rig::new());
     let mut bus = Line::of_bus(TICK);
     bus.set_settings(sender.line.settings());
     sender.line.become_end();
@@ -54,7 +54,7 @@ fn character_that_is_half_a_bit_late_is_received_at_its_true_time() {
 
 #[test]
 fn character_arrives_later_at_the_end_of_a_long_cable() {
-    let (mut sender, mut listener) = (Bench::new(), Bench::new());
+    let (mut sender, mut listener) = (Rig::new(), Rig::new());
     for end in [&mut sender.line, &mut listener.line] {
         end.become_end();
     }
@@ -72,7 +72,7 @@ fn character_arrives_later_at_the_end_of_a_long_cable() {
 
 #[test]
 fn character_cut_by_the_driver_is_also_cut_at_the_other_end() {
-    let (mut sender, mut listener) = (Bench::new(), Bench::new());
+    let (mut sender, mut listener) = (Rig::new(), Rig::new());
     sender.line.become_end();
     listener.line.become_end();
     sender.driver(true);
@@ -95,18 +95,18 @@ fn character_cut_by_the_driver_is_also_cut_at_the_other_end() {
 #[test]
 fn two_units_at_the_same_time_collide_and_the_master_receives_the_wired_and() {
     let mut bus = Line::of_bus(TICK);
-    let (mut one, mut other) = (Bench::new(), Bench::new());
+    let (mut one, mut other) = (Rig::new(), Rig::new());
     bus.set_settings(one.line.settings());
-    for (n, (bench, byte)) in [(&mut one, 0x3C), (&mut other, 0xF1)]
+    for (n, (rig, byte)) in [(&mut one, 0x3C), (&mut other, 0xF1)]
         .into_iter()
         .enumerate()
     {
-        bench.line.become_end();
-        bench.driver(true);
-        bench.write(DR, byte);
-        bench.run_to(TICK + Time::cycles(11 * 625, HZ));
-        bench.driver(false);
-        let output = bench.line.take_output().expect("a character");
+        rig.line.become_end();
+        rig.driver(true);
+        rig.write(DR, byte);
+        rig.run_to(TICK + Time::cycles(11 * 625, HZ));
+        rig.driver(false);
+        let output = rig.line.take_output().expect("a character");
         bus.add_output(n, &output, Time::ZERO);
     }
     bus.pass(Time::from_ms(3), None);

@@ -9,54 +9,54 @@ use sim::Time;
 use sim::radio::{Fault, Parameters};
 use sim::soc::map::Block;
 
-use crate::bench::{FIRST, adu, pages};
-use crate::radio::{bench, starting};
+use crate::radio::{rig, starting};
+use crate::rig::{FIRST, adu, pages};
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn silent_radio_is_reported_and_used_when_it_answers() {
     for fault in [Fault::Absent, Fault::Hung] {
-        let mut bench = starting(Parameters::FACTORY, &[]);
-        bench.board.set_radio_fault(fault);
-        bench.board.take_log();
-        bench.board.run_for(Time::from_ms(3_000));
-        let log = bench.board.take_log();
+        let mut rig = starting(Parameters::FACTORY, &[]);
+        rig.board.set_radio_fault(fault);
+        rig.board.take_log();
+        rig.board.run_for(Time::from_ms(3_000));
+        let log = rig.board.take_log();
         assert!(
             log.contains("WARN radio: the module does not answer"),
             "{log}"
         );
         assert!(
-            bench.status(state::status::MODULE_FAULT),
+            rig.status(state::status::MODULE_FAULT),
             "a module has a fault"
         );
-        assert!(bench.board.leds().fault);
-        bench.assert_answers(1);
-        bench.board.run_for(Time::from_ms(12_000));
-        assert_eq!(bench.board.take_log(), "", "reported once");
-        bench.board.set_radio_fault(Fault::None);
-        bench.board.run_for(Time::from_ms(9_000));
-        assert!(bench.board.take_log().ends_with("radio: ready\n"));
-        assert!(!bench.status(state::status::MODULE_FAULT));
-        bench.assert_answers_over_the_air();
+        assert!(rig.board.leds().fault);
+        rig.assert_answers(1);
+        rig.board.run_for(Time::from_ms(12_000));
+        assert_eq!(rig.board.take_log(), "", "reported once");
+        rig.board.set_radio_fault(Fault::None);
+        rig.board.run_for(Time::from_ms(9_000));
+        assert!(rig.board.take_log().ends_with("radio: ready\n"));
+        assert!(!rig.status(state::status::MODULE_FAULT));
+        rig.assert_answers_over_the_air();
     }
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn module_that_is_removed_is_reported_and_the_next_one_is_set_up() {
-    let mut bench = bench(&[(LORA_ADDRESS, 7)]);
-    bench.board.set_radio_fault(Fault::Absent);
+    let mut rig = rig(&[(LORA_ADDRESS, 7)]);
+    rig.board.set_radio_fault(Fault::Absent);
     // AUX looks busy. The module may be busy for nine packets of 600 ms, and two seconds.
-    bench.board.run_for(Time::from_ms(7_500));
-    assert!(bench.status(state::status::MODULE_FAULT));
-    bench.board.change_radio(|module| {
+    rig.board.run_for(Time::from_ms(7_500));
+    assert!(rig.status(state::status::MODULE_FAULT));
+    rig.board.change_radio(|module| {
         module.set_stored(Parameters::FACTORY);
         module.set_fault(Fault::None);
     });
-    bench.board.run_for(Time::from_ms(9_000));
-    assert!(!bench.status(state::status::MODULE_FAULT));
-    assert_eq!(bench.module().stored(), Parameters::FACTORY.with_address(7));
-    bench.assert_answers_over_the_air();
+    rig.board.run_for(Time::from_ms(9_000));
+    assert!(!rig.status(state::status::MODULE_FAULT));
+    assert_eq!(rig.module().stored(), Parameters::FACTORY.with_address(7));
+    rig.assert_answers_over_the_air();
 }
 
 #[test]
@@ -69,18 +69,18 @@ fn any_bit_of_the_uarts_registers_may_change_at_any_instant() {
         (0x10, 0x7F6F),
         (0x14, 0x07FF),
     ] {
-        let mut bench = bench(&[(LORA_AIR_RATE, 5), (LORA_FRAME_GAP, 20)]);
-        bench.tolerant = true;
+        let mut rig = rig(&[(LORA_AIR_RATE, 5), (LORA_FRAME_GAP, 20)]);
+        rig.tolerant = true;
         for bit in (0..16).filter(|bit| bits >> bit & 1 != 0) {
             let instant = bit % 5;
-            let now = bench.board.now();
-            bench.air().send(now, &adu(&[1, 1, 0, FIRST, 0, 4]));
-            bench.board.run_for(Time::from_ms(instant * 30 + bit));
-            bench.board.upset(Block::Usart3, offset, 1 << bit);
-            bench.board.run_for(Time::from_ms(300));
-            bench.air().take_received();
-            bench.assert_answers_over_the_air();
-            assert_eq!(bench.board.resets(), 0, "{offset:#x}, bit {bit}");
+            let now = rig.board.now();
+            rig.air().send(now, &adu(&[1, 1, 0, FIRST, 0, 4]));
+            rig.board.run_for(Time::from_ms(instant * 30 + bit));
+            rig.board.upset(Block::Usart3, offset, 1 << bit);
+            rig.board.run_for(Time::from_ms(300));
+            rig.air().take_received();
+            rig.assert_answers_over_the_air();
+            assert_eq!(rig.board.resets(), 0, "{offset:#x}, bit {bit}");
         }
     }
 }
@@ -95,33 +95,33 @@ fn disturbed_register_of_the_uart_is_set_again() {
         (0x10, 0x2000),
         (0x14, 0x0008),
     ] {
-        let mut bench = bench(&[]);
-        bench.tolerant = true;
-        bench.board.upset(Block::Usart3, offset, bits);
-        bench.board.run_for(Time::from_ms(150));
-        bench.assert_answers_over_the_air();
-        assert_eq!(bench.register(fault::LINE_REPAIRS), 1, "offset {offset:#x}");
+        let mut rig = rig(&[]);
+        rig.tolerant = true;
+        rig.board.upset(Block::Usart3, offset, bits);
+        rig.board.run_for(Time::from_ms(150));
+        rig.assert_answers_over_the_air();
+        assert_eq!(rig.register(fault::LINE_REPAIRS), 1, "offset {offset:#x}");
     }
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn saves_do_not_disturb_requests_over_the_air() {
-    let mut bench = bench(&[(LORA_AIR_RATE, 5), (LORA_FRAME_GAP, 20)]);
+    let mut rig = rig(&[(LORA_AIR_RATE, 5), (LORA_FRAME_GAP, 20)]);
     let mut changed = false;
     for round in 0..20 {
-        bench.configure(FILTER, &[round + 1; 30]);
-        let now = bench.board.now();
-        bench.air().send(now, &adu(&[1, 1, 0, FIRST, 0, 4]));
+        rig.configure(FILTER, &[round + 1; 30]);
+        let now = rig.board.now();
+        rig.air().send(now, &adu(&[1, 1, 0, FIRST, 0, 4]));
         // At a phase of the request and the reply that moves on from round to round.
-        bench.board.run_for(Time::from_ms(u64::from(round) * 9));
-        bench.write(COMMAND, &[1]).unwrap();
-        bench.board.run_for(Time::from_ms(400));
-        let reply = bench.take_from_the_air();
+        rig.board.run_for(Time::from_ms(u64::from(round) * 9));
+        rig.write(COMMAND, &[1]).unwrap();
+        rig.board.run_for(Time::from_ms(400));
+        let reply = rig.take_from_the_air();
         assert_eq!(reply, adu(&[1, 1, 1, 0]), "round {round}");
         changed |= pages()
             .iter()
-            .any(|page| bench.board.flash()[page.clone()][2..4] == [0xFF; 2]);
+            .any(|page| rig.board.flash()[page.clone()][2..4] == [0xFF; 2]);
     }
     assert!(changed, "a page is erased by some of the saves");
 }
@@ -129,35 +129,35 @@ fn saves_do_not_disturb_requests_over_the_air() {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn rs485_line_at_921600_loses_nothing_while_the_radio_is_busy() {
-    let mut bench = bench(&[
+    let mut rig = rig(&[
         (BAUD, Baud::B921600.code()),
         (LORA_AIR_RATE, 5),
         (LORA_FRAME_GAP, 50),
     ]);
-    bench.settings(sim::line::Settings {
+    rig.settings(sim::line::Settings {
         baud: 921_600,
         ..sim::line::Settings::default()
     });
     // A reply may wait while a request over the air is served.
-    bench.patience = Time::from_ms(1);
+    rig.patience = Time::from_ms(1);
     let echo: Vec<u8> = [1, 8, 0, 0].into_iter().chain(0..=249).collect();
     let request = adu(&echo[..201]);
     let echo = adu(&echo);
     let (mut replies, mut asked) = (0, false);
     for _ in 0..400 {
         if !asked {
-            let now = bench.board.now();
-            bench.air().send(now, &request);
+            let now = rig.board.now();
+            rig.air().send(now, &request);
             asked = true;
         }
-        assert_eq!(bench.hurry(Time::ZERO, &echo).0, echo);
-        if bench.air().received().count() == request.len() {
-            assert_eq!(bench.take_from_the_air(), request);
+        assert_eq!(rig.hurry(Time::ZERO, &echo).0, echo);
+        if rig.air().received().count() == request.len() {
+            assert_eq!(rig.take_from_the_air(), request);
             (replies, asked) = (replies + 1, false);
         }
     }
     assert!(replies >= 2, "{replies} replies over the air");
-    assert_eq!(bench.registers(state::BUS_ERRORS, 1), Ok(vec![0]));
-    assert_eq!(bench.registers(state::OVERRUNS, 2), Ok(vec![0, 0]));
-    assert_eq!(bench.registers(second::BUS_ERRORS, 1), Ok(vec![0]));
+    assert_eq!(rig.registers(state::BUS_ERRORS, 1), Ok(vec![0]));
+    assert_eq!(rig.registers(state::OVERRUNS, 2), Ok(vec![0, 0]));
+    assert_eq!(rig.registers(second::BUS_ERRORS, 1), Ok(vec![0]));
 }

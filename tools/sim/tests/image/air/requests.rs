@@ -5,8 +5,8 @@ use register_map::configuration::{
 };
 use sim::{Corner, Time};
 
-use crate::bench::{adu, corner};
-use crate::radio::{SET_UP, bench};
+use crate::radio::{SET_UP, rig};
+use crate::rig::{adu, corner};
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
@@ -18,11 +18,11 @@ fn longest_reply_and_longest_request_pass_the_air_with_a_frame_gap_above_the_pau
         Corner::Slow => &[(4, 150), (5, 50)],
     };
     for &(air_rate, gap) in cases {
-        let mut bench = bench(&[(LORA_AIR_RATE, air_rate), (LORA_FRAME_GAP, gap)]);
-        assert_eq!(bench.read_over_the_air(FILTER, 32).len(), 32);
+        let mut rig = rig(&[(LORA_AIR_RATE, air_rate), (LORA_FRAME_GAP, gap)]);
+        assert_eq!(rig.read_over_the_air(FILTER, 32).len(), 32);
         let echo: Vec<u8> = [8, 0, 0].into_iter().chain((0..=249).rev()).collect();
         assert_eq!(
-            bench.ask_over_the_air(1, &echo).as_ref(),
+            rig.ask_over_the_air(1, &echo).as_ref(),
             Some(&echo),
             "air rate {air_rate}"
         );
@@ -37,10 +37,10 @@ fn write_of_two_packets_is_answered_with_the_factory_frame_gap() {
         Corner::Nominal | Corner::Fast | Corner::Gd32 => 2,
         Corner::Slow => 3,
     };
-    let mut bench = bench(&[(LORA_AIR_RATE, air_rate)]);
-    bench.write_over_the_air(KEY, OPENING_KEY);
+    let mut rig = rig(&[(LORA_AIR_RATE, air_rate)]);
+    rig.write_over_the_air(KEY, OPENING_KEY);
     let request = [&[0x10, 0x01, 0xA0, 0, 32, 64][..], &[0; 64]].concat();
-    let reply = bench.ask_over_the_air(1, &request);
+    let reply = rig.ask_over_the_air(1, &request);
     assert_eq!(reply, Some(vec![0x10, 0x01, 0xA0, 0, 32]));
 }
 
@@ -48,19 +48,19 @@ fn write_of_two_packets_is_answered_with_the_factory_frame_gap() {
 #[ignore = "needs the image: cargo xtask test"]
 fn save_and_restart_ordered_over_the_air_are_answered_before_they_are_executed() {
     for air_rate in [0, 5] {
-        let mut bench = bench(&[(LORA_AIR_RATE, air_rate)]);
-        bench.tolerant = true;
-        bench.write_over_the_air(KEY, OPENING_KEY);
-        bench.write_over_the_air(FILTER, 77);
-        bench.write_over_the_air(COMMAND, 1);
-        bench.board.run_for(Time::from_ms(100));
-        bench.write_over_the_air(COMMAND, 2);
+        let mut rig = rig(&[(LORA_AIR_RATE, air_rate)]);
+        rig.tolerant = true;
+        rig.write_over_the_air(KEY, OPENING_KEY);
+        rig.write_over_the_air(FILTER, 77);
+        rig.write_over_the_air(COMMAND, 1);
+        rig.board.run_for(Time::from_ms(100));
+        rig.write_over_the_air(COMMAND, 2);
         // The unit waits for the longest time of a packet on the air, 4.8 s at 0.3 kbit/s, before the restart and
         // after it.
-        bench.board.run_for(Time::from_ms(10_000) + SET_UP);
-        bench.assert_restarted();
+        rig.board.run_for(Time::from_ms(10_000) + SET_UP);
+        rig.assert_restarted();
         assert_eq!(
-            bench.read_over_the_air(FILTER, 1),
+            rig.read_over_the_air(FILTER, 1),
             [77],
             "air rate {air_rate}"
         );
@@ -70,19 +70,19 @@ fn save_and_restart_ordered_over_the_air_are_answered_before_they_are_executed()
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn command_of_one_line_waits_for_its_own_reply_only() {
-    let mut bench = bench(&[]);
-    bench.tolerant = true;
-    bench.write_over_the_air(KEY, OPENING_KEY);
+    let mut rig = rig(&[]);
+    rig.tolerant = true;
+    rig.write_over_the_air(KEY, OPENING_KEY);
     // A restart ordered over the air, while the other line is polled without pause.
     let [a, b] = COMMAND.to_be_bytes();
-    let now = bench.board.now();
-    bench.air().send(now, &adu(&[1, 6, a, b, 0, 2]));
+    let now = rig.board.now();
+    rig.air().send(now, &adu(&[1, 6, a, b, 0, 2]));
     let mut polls = 0;
-    while bench.air().received().count() < 8 {
-        bench.assert_answers(1);
+    while rig.air().received().count() < 8 {
+        rig.assert_answers(1);
         polls += 1;
     }
     assert!(polls > 5, "{polls}");
-    bench.board.run_for(SET_UP);
-    bench.assert_restarted();
+    rig.board.run_for(SET_UP);
+    rig.assert_restarted();
 }

@@ -7,8 +7,8 @@ use register_map::{
 use sim::radio::{Parameters, timing};
 use sim::{Bus, Config, Corner, Module, Time};
 
-use crate::bench::{self, adu, config};
 use crate::radio::SET_UP;
+use crate::rig::{self, adu, config};
 
 /// The rates of LORA_AIR_RATE in bit/s.
 const RATES: [u32; 6] = [300, 1200, 2400, 4800, 9600, 19_200];
@@ -38,7 +38,7 @@ impl Air {
                 ..config(Module::Di4, &[(LORA, 1), (LORA_AIR_RATE, code)])
             };
             config.chip.corner = corner;
-            bench::board(config)
+            rig::board(config)
         };
         let mut bus = Bus::new([1, 2, 3].map(board).into());
         bus.run_for(SET_UP);

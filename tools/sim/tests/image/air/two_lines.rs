@@ -9,10 +9,10 @@ use register_map::{
 use sim::Time;
 use sim::radio::Mode;
 
-use crate::bench::{Bench, adu};
-use crate::radio::{SET_UP, bench};
+use crate::radio::{SET_UP, rig};
+use crate::rig::{Rig, adu};
 
-impl Bench {
+impl Rig {
     /// Writes COMMAND over the air, and returns at the instant at which the gateway has the reply.
     fn order_over_the_air(&mut self, command: u8) {
         let [a, b] = COMMAND.to_be_bytes();
@@ -31,27 +31,27 @@ impl Bench {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn save_ordered_over_the_air_is_done_before_a_restart_ordered_over_the_wire() {
-    let mut bench = bench(&[]);
-    bench.tolerant = true;
-    bench.configure(FILTER, &[77]);
-    bench.write_over_the_air(KEY, OPENING_KEY);
-    bench.order_over_the_air(1);
-    bench.command(2);
-    bench.board.run_for(SET_UP);
-    bench.assert_restarted();
-    assert_eq!(bench.register(FILTER), 77);
+    let mut rig = rig(&[]);
+    rig.tolerant = true;
+    rig.configure(FILTER, &[77]);
+    rig.write_over_the_air(KEY, OPENING_KEY);
+    rig.order_over_the_air(1);
+    rig.command(2);
+    rig.board.run_for(SET_UP);
+    rig.assert_restarted();
+    assert_eq!(rig.register(FILTER), 77);
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn defaults_ordered_over_the_air_do_not_replace_later_settings() {
-    let mut bench = bench(&[]);
-    bench.configure(FILTER, &[77]);
-    bench.write_over_the_air(KEY, OPENING_KEY);
-    bench.order_over_the_air(3);
-    bench.configure(FILTER, &[78]);
-    bench.board.run_for(SET_UP);
-    assert_eq!(bench.register(FILTER), 78);
+    let mut rig = rig(&[]);
+    rig.configure(FILTER, &[77]);
+    rig.write_over_the_air(KEY, OPENING_KEY);
+    rig.order_over_the_air(3);
+    rig.configure(FILTER, &[78]);
+    rig.board.run_for(SET_UP);
+    assert_eq!(rig.register(FILTER), 78);
 }
 
 /// A request over the air that is never complete is reported to the watchdog when LORA_FRAME_GAP has passed, which is
@@ -59,16 +59,16 @@ fn defaults_ordered_over_the_air_do_not_replace_later_settings() {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn polled_wire_keeps_the_communication_watchdog_quiet_during_a_request_over_the_air() {
-    let mut bench = bench(&[(COMM_TIMEOUT, 3), (LORA_FRAME_GAP, 500)]);
+    let mut rig = rig(&[(COMM_TIMEOUT, 3), (LORA_FRAME_GAP, 500)]);
     // The watchdog has tripped in the set-up.
-    bench.command(5);
-    let now = bench.board.now();
-    bench.air().send(now, &adu(&[1, 8, 0, 0, 1, 2, 3, 4]));
+    rig.command(5);
+    let now = rig.board.now();
+    rig.air().send(now, &adu(&[1, 8, 0, 0, 1, 2, 3, 4]));
     for _ in 0..20 {
-        bench.board.run_for(Time::from_ms(80));
-        assert_eq!(bench.register(state::STATUS) & 1, 0);
+        rig.board.run_for(Time::from_ms(80));
+        assert_eq!(rig.register(state::STATUS) & 1, 0);
     }
-    assert!(bench.air().received().count() > 0, "it was answered");
+    assert!(rig.air().received().count() > 0, "it was answered");
 }
 
 /// AUX is high while the last packet is on the air, and a reset of the part does not end it. What is sent to the module
@@ -80,24 +80,24 @@ fn restart_during_a_reply_over_the_air_sends_nothing_else() {
     let long = adu(&[1, 3, a, b, 0, 4]);
     let longest = adu(&[&[1, 8, 0, 0], &[0x55; 100][..]].concat());
     for (air_rate, request) in [(0, &long), (2, &long), (5, &longest)] {
-        let mut bench = bench(&[(LORA_AIR_RATE, air_rate), (LORA_FRAME_GAP, 50)]);
-        bench.tolerant = true;
-        let now = bench.board.now();
-        bench.air().send(now, request);
-        while bench.packets_of_the_unit().is_empty() {
-            bench.board.run_for(Time::from_ms(5));
+        let mut rig = rig(&[(LORA_AIR_RATE, air_rate), (LORA_FRAME_GAP, 50)]);
+        rig.tolerant = true;
+        let now = rig.board.now();
+        rig.air().send(now, request);
+        while rig.packets_of_the_unit().is_empty() {
+            rig.board.run_for(Time::from_ms(5));
         }
-        bench.board.run_for(Time::from_ms(10));
-        let before = bench.board.resets();
-        bench.command(2);
+        rig.board.run_for(Time::from_ms(10));
+        let before = rig.board.resets();
+        rig.command(2);
         let mut ready = false;
         for _ in 0..600 {
-            bench.board.run_for(Time::from_ms(20));
-            ready |= bench.board.resets() > before && bench.module().mode() == Some(Mode::Normal);
+            rig.board.run_for(Time::from_ms(20));
+            ready |= rig.board.resets() > before && rig.module().mode() == Some(Mode::Normal);
         }
         assert!(ready, "air rate {air_rate}");
-        let reply = bench.take_from_the_air();
-        let sent = bench.packets_of_the_unit();
+        let reply = rig.take_from_the_air();
+        let sent = rig.packets_of_the_unit();
         let sent = sent.iter().map(|packet| &packet.bytes[..]);
         assert_eq!(
             sent.collect::<Vec<_>>().concat(),
@@ -105,6 +105,6 @@ fn restart_during_a_reply_over_the_air_sends_nothing_else() {
             "air rate {air_rate}"
         );
         assert!(reply == adu(&reply[..reply.len() - 2]), "{reply:02X?}");
-        bench.assert_answers_over_the_air();
+        rig.assert_answers_over_the_air();
     }
 }

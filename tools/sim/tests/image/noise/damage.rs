@@ -4,7 +4,7 @@ use fastrand::Rng;
 use sim::line::{Character, Settings};
 
 use super::traffic::{self, Outputs};
-use crate::bench::adu;
+use crate::rig::adu;
 
 /// Kind of damage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 use fastrand::Rng;
 
-use crate::bench::FIRST;
+use crate::rig::FIRST;
 
 /// Expected states of the outputs of unit 1.
 #[derive(Clone, Debug, Default)]

@@ -6,7 +6,7 @@ use register_map::{configuration::LORA, state};
 use sim::radio::{Packet, Parameters, Sender};
 use sim::{Config, Module, Time};
 
-use crate::bench::{Bench, FIRST, adu, config};
+use crate::rig::{FIRST, Rig, adu, config};
 
 /// Time for the module's start and set-up: 500 ms for its own start, the rest for commands and changes of the mode.
 pub const SET_UP: Time = Time::from_ms(1_500);
@@ -16,21 +16,21 @@ pub const SILENCE: Time = Time::from_ms(6_000);
 const PAUSE: Time = Time::from_ms(700);
 
 /// A 4DI at unit address 1 with a radio module, before its set-up is complete.
-pub fn starting(module: Parameters, settings: &[(u16, u16)]) -> Bench {
-    Bench::with(Config {
+pub fn starting(module: Parameters, settings: &[(u16, u16)]) -> Rig {
+    Rig::with(Config {
         radio: Some(module),
         ..config(Module::Di4, &[&[(LORA, 1)], settings].concat())
     })
 }
 
 /// The same after its set-up.
-pub fn bench(settings: &[(u16, u16)]) -> Bench {
-    let mut bench = starting(Parameters::FACTORY, settings);
-    bench.board.run_for(SET_UP);
-    bench
+pub fn rig(settings: &[(u16, u16)]) -> Rig {
+    let mut rig = starting(Parameters::FACTORY, settings);
+    rig.board.run_for(SET_UP);
+    rig
 }
 
-impl Bench {
+impl Rig {
     /// Returns the radio module.
     pub fn module(&self) -> &sim::radio::Module {
         self.board.radio().expect("a module is fitted")

@@ -62,36 +62,36 @@ fn change(flash: &mut [u8], change: &Change, cut: Option<u64>) {
 /// A whole update, from the order to prepare to the confirmation: the flash before it, and its changes.
 fn recorded() -> (Vec<u8>, Vec<Change>) {
     // Something to erase is in slot B.
-    let mut bench = unit_of([&image(0), &image(1)]);
-    let first = bench.board.flash().to_vec();
+    let mut rig = unit_of([&image(0), &image(1)]);
+    let first = rig.board.flash().to_vec();
     let (mut before, mut all) = (first.clone(), Vec::new());
-    let mut note = |bench: &Bench| {
-        let after = bench.board.flash();
+    let mut note = |rig: &Rig| {
+        let after = rig.board.flash();
         if before != after {
             all.extend(changes(&before, after));
             before = after.to_vec();
         }
     };
-    assert_eq!(bench.order(Command::Prepare), Ok(()));
-    note(&bench);
-    while bench.update_status().pages > 0 {
-        note(&bench);
+    assert_eq!(rig.order(Command::Prepare), Ok(()));
+    note(&rig);
+    while rig.update_status().pages > 0 {
+        note(&rig);
     }
     for (number, block) in (0..).zip(image(1).chunks(BLOCK_BYTES)) {
-        while bench.block(Slot::B, number, block).is_err() {}
-        note(&bench);
+        while rig.block(Slot::B, number, block).is_err() {}
+        note(&rig);
     }
-    bench.board.run_for(ERASE);
-    assert_eq!(bench.order(Command::Finish), Ok(()));
-    let end = bench.board.now() + CHECK;
-    while bench.board.now() < end {
-        bench.board.run_for(Time::from_ms(1));
-        note(&bench);
+    rig.board.run_for(ERASE);
+    assert_eq!(rig.order(Command::Finish), Ok(()));
+    let end = rig.board.now() + CHECK;
+    while rig.board.now() < end {
+        rig.board.run_for(Time::from_ms(1));
+        note(&rig);
     }
-    assert_eq!(bench.order(Command::Confirm), Ok(()));
-    bench.board.run_for(ERASE);
-    note(&bench);
-    assert_eq!(runs_from(&mut bench), 1);
+    assert_eq!(rig.order(Command::Confirm), Ok(()));
+    rig.board.run_for(ERASE);
+    note(&rig);
+    assert_eq!(runs_from(&mut rig), 1);
     (first, all)
 }
 
@@ -119,15 +119,15 @@ fn a_power_cut_in_any_flash_operation_of_an_update_leaves_a_unit_that_serves() {
         if always(next) || passed.is_multiple_of(step) {
             let mut cut = flash.clone();
             change(&mut cut, next, Some(n as u64));
-            let mut bench = starting(cut);
-            let (slot, _) = after(&mut bench);
+            let mut rig = starting(cut);
+            let (slot, _) = after(&mut rig);
             starts[slot] += 1;
             // It can be updated, or confirmed first.
-            if bench.register(UPDATE) & 1 << 5 != 0 {
-                assert_eq!(bench.order(Command::Confirm), Ok(()), "cut {n}");
-                bench.board.run_for(ERASE);
+            if rig.register(UPDATE) & 1 << 5 != 0 {
+                assert_eq!(rig.order(Command::Confirm), Ok(()), "cut {n}");
+                rig.board.run_for(ERASE);
             }
-            assert_eq!(bench.order(Command::Prepare), Ok(()), "cut {n}");
+            assert_eq!(rig.order(Command::Prepare), Ok(()), "cut {n}");
         }
         change(&mut flash, next, None);
     }

@@ -19,11 +19,11 @@ use sim::line::{Format, Settings};
 use sim::{Module, Time};
 
 use crate::LAYOUT;
-use crate::bench::{Bench, PAGE_SIZE, SLOT, adu};
 use crate::in_slots::{
     APPLICATION, CHECK, CRC, FIRST_KEY, HASH, SECOND_KEY, SIGNATURE, START, answers, answers_as,
     fitted, flash, holding, image, number, runs_from, sign, signed, signed_by, unit, with_crc,
 };
+use crate::rig::{PAGE_SIZE, Rig, SLOT, adu};
 use crate::saving::SLOWEST;
 
 /// The state of an update, from file 2.
@@ -43,7 +43,7 @@ const ERASE: Time = Time::from_ms(40);
 const CONFIRMED: u16 = 5;
 const REJECTED: u16 = 6;
 
-impl Bench {
+impl Rig {
     fn word(&mut self, address: u16, value: u16) -> Option<Vec<u8>> {
         let [[a, b], [c, d]] = [address, value].map(u16::to_be_bytes);
         self.ask(1, &[6, a, b, c, d])
@@ -137,89 +137,89 @@ const FAST: Settings = Settings {
 };
 
 /// Returns a unit with these images, at 921600 bit/s.
-fn unit_of(slots: [&[u8]; 2]) -> Bench {
-    let mut bench = unit(slots, &[(BAUD, Baud::B921600.code())]);
-    bench.settings(FAST);
-    answers(&mut bench, CHECK + START).expect("it starts");
+fn unit_of(slots: [&[u8]; 2]) -> Rig {
+    let mut rig = unit(slots, &[(BAUD, Baud::B921600.code())]);
+    rig.settings(FAST);
+    answers(&mut rig, CHECK + START).expect("it starts");
     // A reply waits for the erase of a page.
-    bench.patience = ERASE;
-    bench
+    rig.patience = ERASE;
+    rig
 }
 
 /// Returns a unit that runs from slot A, and has nothing in slot B.
-fn running() -> Bench {
+fn running() -> Rig {
     unit_of([&image(0), &[]])
 }
 
 /// Runs until the unit answers after an update, and returns how it then stands.
-fn after(bench: &mut Bench) -> (usize, Status) {
+fn after(rig: &mut Rig) -> (usize, Status) {
     // The order is carried out after its reply.
-    bench.board.run_for(Time::from_ms(20));
-    answers(bench, CHECK + START).expect("it starts");
-    (runs_from(bench), bench.update_status())
+    rig.board.run_for(Time::from_ms(20));
+    answers(rig, CHECK + START).expect("it starts");
+    (runs_from(rig), rig.update_status())
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn the_new_image_starts_and_serves_and_stays_once_it_is_confirmed() {
-    let mut bench = running();
-    assert_eq!(bench.update_status().slot, 1);
-    bench.prepare();
-    bench.send(Slot::B, &image(1));
-    bench.board.run_for(ERASE);
-    let free = bench.register(STACK_FREE);
+    let mut rig = running();
+    assert_eq!(rig.update_status().slot, 1);
+    rig.prepare();
+    rig.send(Slot::B, &image(1));
+    rig.board.run_for(ERASE);
+    let free = rig.register(STACK_FREE);
     assert!(free >= 1024, "{free} bytes of stack");
-    assert_eq!(bench.order(Command::Finish), Ok(()));
-    let from = bench.board.now();
-    let (slot, _) = after(&mut bench);
-    println!("out of service for {:?}", bench.board.now() - from);
+    assert_eq!(rig.order(Command::Finish), Ok(()));
+    let from = rig.board.now();
+    let (slot, _) = after(&mut rig);
+    println!("out of service for {:?}", rig.board.now() - from);
     assert_eq!(slot, 1);
-    assert_eq!(bench.register(UPDATE) & 0b10_0011, 0b10_0010, "on trial");
-    assert_eq!(bench.order(Command::Prepare), Err(6));
-    assert_eq!(bench.order(Command::GoBack), Err(6));
-    assert_eq!(bench.order(Command::Confirm), Ok(()));
-    bench.board.run_for(ERASE);
-    assert_eq!(bench.register(UPDATE), 0b1_0110, "confirmed, as the other");
-    bench.board.cycle();
-    assert_eq!(after(&mut bench).0, 1);
+    assert_eq!(rig.register(UPDATE) & 0b10_0011, 0b10_0010, "on trial");
+    assert_eq!(rig.order(Command::Prepare), Err(6));
+    assert_eq!(rig.order(Command::GoBack), Err(6));
+    assert_eq!(rig.order(Command::Confirm), Ok(()));
+    rig.board.run_for(ERASE);
+    assert_eq!(rig.register(UPDATE), 0b1_0110, "confirmed, as the other");
+    rig.board.cycle();
+    assert_eq!(after(&mut rig).0, 1);
     // The way back takes the same trial.
-    assert_eq!(bench.order(Command::GoBack), Ok(()));
-    assert_eq!(after(&mut bench).0, 0);
-    assert_eq!(bench.register(UPDATE) & 0b10_0011, 0b10_0001, "on trial");
-    assert_eq!(bench.order(Command::Confirm), Ok(()));
-    bench.board.run_for(ERASE);
-    assert_eq!(bench.register(UPDATE), 0b1_0101);
+    assert_eq!(rig.order(Command::GoBack), Ok(()));
+    assert_eq!(after(&mut rig).0, 0);
+    assert_eq!(rig.register(UPDATE) & 0b10_0011, 0b10_0001, "on trial");
+    assert_eq!(rig.order(Command::Confirm), Ok(()));
+    rig.board.run_for(ERASE);
+    assert_eq!(rig.register(UPDATE), 0b1_0101);
 }
 
 /// The flash of a unit that has taken the image for slot B, and whose loader has not checked it yet.
 static NEW: LazyLock<Vec<u8>> = LazyLock::new(|| {
-    let mut bench = running();
-    bench.update(&image(1));
-    while bench.board.pc() >= LAYOUT.board.layout().slots[0] {
-        bench.board.run_for(Time::from_us(20));
+    let mut rig = running();
+    rig.update(&image(1));
+    while rig.board.pc() >= LAYOUT.board.layout().slots[0] {
+        rig.board.run_for(Time::from_us(20));
     }
-    bench.board.flash().to_vec()
+    rig.board.flash().to_vec()
 });
 
 /// The flash of a unit that runs from slot B since an update, with a confirmed image in slot A.
 static UPDATED: LazyLock<Vec<u8>> = LazyLock::new(|| {
-    let mut bench = starting(NEW.clone());
-    assert_eq!(after(&mut bench).0, 1);
-    assert_eq!(bench.order(Command::Confirm), Ok(()));
-    bench.board.run_for(ERASE);
-    bench.board.flash().to_vec()
+    let mut rig = starting(NEW.clone());
+    assert_eq!(after(&mut rig).0, 1);
+    assert_eq!(rig.order(Command::Confirm), Ok(()));
+    rig.board.run_for(ERASE);
+    rig.board.flash().to_vec()
 });
 
 /// Returns a unit that is powered now, with this flash.
-fn starting(flash: Vec<u8>) -> Bench {
-    let mut bench = holding(flash, 1);
-    bench.settings(FAST);
-    bench.patience = ERASE;
-    bench
+fn starting(flash: Vec<u8>) -> Rig {
+    let mut rig = holding(flash, 1);
+    rig.settings(FAST);
+    rig.patience = ERASE;
+    rig
 }
 
 /// Returns the unit of [`NEW`] with bytes changed in the image.
-fn with_changes(changes: &[u8]) -> Bench {
+fn with_changes(changes: &[u8]) -> Rig {
     let mut flash = NEW.clone();
     let b = (LAYOUT.board.layout().slots[1] - 0x0800_0000) as usize;
     flash[b..b + changes.len()].copy_from_slice(changes);
@@ -227,9 +227,9 @@ fn with_changes(changes: &[u8]) -> Bench {
 }
 
 /// The unit has been updated once, so both slots hold a confirmed image, and B runs.
-fn updated(bench: &mut Bench, image: &[u8]) {
-    bench.update(image);
-    assert_eq!(after(bench).0, 1);
-    assert_eq!(bench.order(Command::Confirm), Ok(()));
-    bench.board.run_for(ERASE);
+fn updated(rig: &mut Rig, image: &[u8]) {
+    rig.update(image);
+    assert_eq!(after(rig).0, 1);
+    assert_eq!(rig.order(Command::Confirm), Ok(()));
+    rig.board.run_for(ERASE);
 }

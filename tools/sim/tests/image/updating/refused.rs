@@ -32,19 +32,19 @@ fn refused_images() -> [(&'static str, u16, Vec<u8>); 7] {
 #[ignore = "needs the image: cargo xtask test"]
 fn an_image_that_is_not_genuine_is_refused_and_the_old_one_runs() {
     for (what, reason, image) in refused_images() {
-        let mut bench = with_changes(&image);
-        let (slot, status) = after(&mut bench);
+        let mut rig = with_changes(&image);
+        let (slot, status) = after(&mut rig);
         let refused = (slot, status.state, status.reason);
         assert_eq!(refused, (0, REJECTED, reason), "{what}");
-        assert_eq!(bench.order(Command::GoBack), Err(6), "{what}");
-        assert_eq!(bench.order(Command::Finish), Err(6), "{what}");
+        assert_eq!(rig.order(Command::GoBack), Err(6), "{what}");
+        assert_eq!(rig.order(Command::Finish), Err(6), "{what}");
     }
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn an_image_that_is_not_intact_is_refused_without_a_restart() {
-    let mut bench = running();
+    let mut rig = running();
     let last = image(1).len() - 1;
     let changed = |at: usize| {
         let mut image = image(1);
@@ -52,44 +52,44 @@ fn an_image_that_is_not_intact_is_refused_without_a_restart() {
         image
     };
     for (what, reason, image) in [("code", 6, changed(last)), ("zero area", 1, changed(511))] {
-        bench.prepare();
-        bench.send(Slot::B, &image);
-        bench.board.run_for(ERASE);
-        assert_eq!(bench.order(Command::Finish), Ok(()));
-        bench.board.run_for(ERASE);
-        let status = bench.update_status();
+        rig.prepare();
+        rig.send(Slot::B, &image);
+        rig.board.run_for(ERASE);
+        assert_eq!(rig.order(Command::Finish), Ok(()));
+        rig.board.run_for(ERASE);
+        let status = rig.update_status();
         assert_eq!((status.state, status.reason), (1, reason), "{what}");
         assert_eq!(status.missing, status.blocks, "{what}");
-        assert_eq!(bench.board.resets(), 1, "that of the first start");
+        assert_eq!(rig.board.resets(), 1, "that of the first start");
     }
     // What is right already is not written again.
-    bench.send(Slot::B, &image(1));
-    bench.board.run_for(ERASE);
-    assert_eq!(bench.update_status().missing, 0);
-    assert_eq!(bench.order(Command::Finish), Ok(()));
-    assert_eq!(after(&mut bench).0, 1);
+    rig.send(Slot::B, &image(1));
+    rig.board.run_for(ERASE);
+    assert_eq!(rig.update_status().missing, 0);
+    assert_eq!(rig.order(Command::Finish), Ok(()));
+    assert_eq!(after(&mut rig).0, 1);
 }
 
 /// Attack: a slot that was confirmed is prepared and filled with code that is not signed, and then chosen in every way.
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn code_that_is_not_signed_is_never_started() {
-    let mut bench = starting(UPDATED.clone());
-    assert_eq!(after(&mut bench).0, 1);
+    let mut rig = starting(UPDATED.clone());
+    assert_eq!(after(&mut rig).0, 1);
     // Slot A was confirmed.
     let mut forged = image(0);
     forged[20_000] ^= 1;
     with_crc(&mut forged);
-    bench.prepare();
-    bench.send(Slot::A, &forged);
-    bench.board.run_for(ERASE);
-    assert_eq!(bench.order(Command::GoBack), Err(6));
-    let mut switched = holding(bench.board.flash().to_vec(), 254);
+    rig.prepare();
+    rig.send(Slot::A, &forged);
+    rig.board.run_for(ERASE);
+    assert_eq!(rig.order(Command::GoBack), Err(6));
+    let mut switched = holding(rig.board.flash().to_vec(), 254);
     switched.patience = ERASE;
     answers_as(&mut switched, 255, START).expect("it starts");
     assert_eq!(runs_from(&mut switched), 1);
     // The image that runs is damaged.
-    let mut flash = bench.board.flash().to_vec();
+    let mut flash = rig.board.flash().to_vec();
     let b = (LAYOUT.board.layout().slots[1] - 0x0800_0000) as usize;
     flash[b + 20_000] ^= 1;
     let mut damaged = holding(flash, 1);
@@ -101,21 +101,21 @@ fn code_that_is_not_signed_is_never_started() {
 #[ignore = "needs the image: cargo xtask test"]
 fn an_image_of_an_older_epoch_is_never_started() {
     let epoch = |slot, epoch| signed(slot, |image| image[6] = epoch);
-    let mut bench = unit_of([&epoch(0, 2), &[]]);
+    let mut rig = unit_of([&epoch(0, 2), &[]]);
     assert_eq!(
-        bench.records(5, 1),
+        rig.records(5, 1),
         [2],
         "the floor is that of the first image"
     );
-    bench.update(&epoch(1, 1));
-    let (slot, status) = after(&mut bench);
+    rig.update(&epoch(1, 1));
+    let (slot, status) = after(&mut rig);
     assert_eq!((slot, status.state, status.reason), (0, REJECTED, 5));
-    updated(&mut bench, &epoch(1, 3));
-    assert_eq!(bench.records(5, 1), [3]);
+    updated(&mut rig, &epoch(1, 3));
+    assert_eq!(rig.records(5, 1), [3]);
     // The image in slot A is confirmed, and below the floor now.
-    assert_eq!(bench.update_status().state, CONFIRMED);
-    assert_eq!(bench.order(Command::GoBack), Err(6));
-    let mut switched = holding(bench.board.flash().to_vec(), 254);
+    assert_eq!(rig.update_status().state, CONFIRMED);
+    assert_eq!(rig.order(Command::GoBack), Err(6));
+    let mut switched = holding(rig.board.flash().to_vec(), 254);
     answers_as(&mut switched, 255, START).expect("it starts");
     assert_eq!(runs_from(&mut switched), 1);
 }

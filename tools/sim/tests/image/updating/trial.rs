@@ -34,14 +34,14 @@ fn switch_254_starts_the_other_image_until_the_next_power_on_or_an_order() {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn command_b007_restarts_once_as_with_switch_255() {
-    let mut bench = running();
-    assert_eq!(bench.order(Command::RestartAs255), Ok(()));
-    bench.board.run_for(Time::from_ms(20));
-    bench.settings(Settings::default());
-    answers_as(&mut bench, 255, START).expect("it starts");
-    bench.board.reset();
-    bench.settings(FAST);
-    answers(&mut bench, START).expect("it starts");
+    let mut rig = running();
+    assert_eq!(rig.order(Command::RestartAs255), Ok(()));
+    rig.board.run_for(Time::from_ms(20));
+    rig.settings(Settings::default());
+    answers_as(&mut rig, 255, START).expect("it starts");
+    rig.board.reset();
+    rig.settings(FAST);
+    answers(&mut rig, START).expect("it starts");
 }
 
 /// Patches code at the reset vector's target.
@@ -59,46 +59,43 @@ fn at_reset(code: &'static [u8]) -> impl FnOnce(&mut [u8]) {
 fn an_image_that_hangs_or_faults_is_rolled_back_without_help() {
     // An endless loop, and an undefined instruction.
     for code in [&[0xFE, 0xE7][..], &[0x00, 0xDE]] {
-        let mut bench = with_changes(&signed(1, at_reset(code)));
+        let mut rig = with_changes(&signed(1, at_reset(code)));
         // Two starts on trial, each up to the loader's watchdog, 8 s at 40 kHz, 14 s at 30 kHz.
-        bench.board.run_for(Time::from_ms(20));
-        answers(&mut bench, CHECK + Time::from_ms(30_000)).expect("the old one serves");
-        let status = bench.update_status();
-        assert_eq!(runs_from(&mut bench), 0);
+        rig.board.run_for(Time::from_ms(20));
+        answers(&mut rig, CHECK + Time::from_ms(30_000)).expect("the old one serves");
+        let status = rig.update_status();
+        assert_eq!(runs_from(&mut rig), 0);
         assert_eq!((status.state, status.reason), (REJECTED, 10));
         // It may be tried again.
-        assert_eq!(bench.order(Command::Finish), Ok(()));
+        assert_eq!(rig.order(Command::Finish), Ok(()));
     }
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn an_image_that_nobody_confirms_is_rolled_back_after_15_minutes_each_start() {
-    let mut bench = starting(NEW.clone());
-    assert_eq!(after(&mut bench).0, 1);
-    let minutes = |bench: &mut Bench, minutes: u64| {
-        bench.board.run_for(Time::from_ms(60_000 * minutes));
-        runs_from(bench)
+    let mut rig = starting(NEW.clone());
+    assert_eq!(after(&mut rig).0, 1);
+    let minutes = |rig: &mut Rig, minutes: u64| {
+        rig.board.run_for(Time::from_ms(60_000 * minutes));
+        runs_from(rig)
     };
-    assert_eq!(minutes(&mut bench, 14), 1);
-    assert_eq!(minutes(&mut bench, 2), 1, "the second start");
-    assert_eq!(minutes(&mut bench, 15), 0);
-    let (_, status) = after(&mut bench);
+    assert_eq!(minutes(&mut rig, 14), 1);
+    assert_eq!(minutes(&mut rig, 2), 1, "the second start");
+    assert_eq!(minutes(&mut rig, 15), 0);
+    let (_, status) = after(&mut rig);
     assert_eq!((status.state, status.reason), (REJECTED, 10));
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn power_cut_during_the_check_needs_only_the_order_again() {
-    let mut bench = starting(NEW.clone());
-    bench.board.run_for(Time::from_ms(700));
-    assert!(
-        bench.board.pc() < LAYOUT.board.layout().slots[0],
-        "it checks"
-    );
-    bench.board.cycle();
-    let (slot, status) = after(&mut bench);
+    let mut rig = starting(NEW.clone());
+    rig.board.run_for(Time::from_ms(700));
+    assert!(rig.board.pc() < LAYOUT.board.layout().slots[0], "it checks");
+    rig.board.cycle();
+    let (slot, status) = after(&mut rig);
     assert_eq!((slot, status.state, status.reason), (0, REJECTED, 9));
-    assert_eq!(bench.order(Command::Finish), Ok(()));
-    assert_eq!(after(&mut bench).0, 1);
+    assert_eq!(rig.order(Command::Finish), Ok(()));
+    assert_eq!(after(&mut rig).0, 1);
 }

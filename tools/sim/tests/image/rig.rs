@@ -179,7 +179,7 @@ pub fn format(code: u16) -> Format {
 }
 
 /// A board and its master.
-pub struct Bench {
+pub struct Rig {
     pub board: Board,
     settings: Settings,
     /// End of the last stop bit that was sent.
@@ -190,7 +190,7 @@ pub struct Bench {
     pub tolerant: bool,
 }
 
-impl Bench {
+impl Rig {
     /// Returns a board with this module and switch, powered and with time to start.
     pub fn new(module: Module, dip: u8) -> Self {
         Self::with(Config {
@@ -201,20 +201,20 @@ impl Bench {
 
     /// Returns a board with this module, unit address 1 and more stored settings.
     pub fn set_up(module: Module, settings: &[(u16, u16)]) -> Self {
-        let mut bench = Self::with(config(module, settings));
+        let mut rig = Self::with(config(module, settings));
         let stored = |address| settings.iter().find(|pair| pair.0 == address);
-        bench.settings(Settings {
+        rig.settings(Settings {
             baud: stored(configuration::BAUD).map_or(9600, |pair| u32::from(pair.1) * 100),
             format: stored(configuration::FORMAT).map_or(Format::N2, |pair| format(pair.1)),
         });
-        bench
+        rig
     }
 
     /// Returns a board with this configuration, powered and with time to start.
     pub fn with(config: Config) -> Self {
-        let mut bench = Self::cold(config);
-        bench.board.run_for(START);
-        bench
+        let mut rig = Self::cold(config);
+        rig.board.run_for(START);
+        rig
     }
 
     /// Returns a board that was powered just now, at the corner at which the tests run.
@@ -367,7 +367,7 @@ impl Bench {
     }
 }
 
-impl Drop for Bench {
+impl Drop for Rig {
     fn drop(&mut self) {
         if std::thread::panicking() {
             return;

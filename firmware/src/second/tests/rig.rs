@@ -125,7 +125,7 @@ impl InputPin for Pin {
 }
 
 /// Unit 17 with ten registers of value 0x1111.
-pub(super) struct Bench<P = Lora<Shared, Pin, Pin>> {
+pub(super) struct Rig<P = Lora<Shared, Pin, Pin>> {
     pub(super) module: Shared,
     pub(super) line: SecondLine<P, u8>,
     pub(super) server: Server,
@@ -133,7 +133,7 @@ pub(super) struct Bench<P = Lora<Shared, Pin, Pin>> {
     pub(super) now_ms: u32,
 }
 
-impl Bench {
+impl Rig {
     /// A unit whose radio is not set up yet.
     pub(super) fn starting() -> Self {
         let module = Shared::default();
@@ -154,13 +154,13 @@ impl Bench {
 
     /// A unit whose radio is ready and has been silent.
     pub(super) fn new() -> Self {
-        let mut bench = Self::starting();
-        while bench.line.works().is_none() {
-            bench.pass(1);
+        let mut rig = Self::starting();
+        while rig.line.works().is_none() {
+            rig.pass(1);
         }
-        assert_eq!(bench.line.works(), Some(true));
-        bench.pass(GAP_MS);
-        bench
+        assert_eq!(rig.line.works(), Some(true));
+        rig.pass(GAP_MS);
+        rig
     }
 
     #[track_caller]
@@ -177,12 +177,12 @@ impl Bench {
     }
 }
 
-impl Bench<Rs232<Shared>> {
+impl Rig<Rs232<Shared>> {
     /// A unit with RS-232 that has been silent.
     pub(super) fn rs232() -> Self {
-        let mut bench = Self::rs232_starting();
-        bench.pass(10);
-        bench
+        let mut rig = Self::rs232_starting();
+        rig.pass(10);
+        rig
     }
 
     /// A unit with RS-232 that has just started.
@@ -195,7 +195,7 @@ impl Bench<Rs232<Shared>> {
     }
 }
 
-impl<P: Peer> Bench<P> {
+impl<P: Peer> Rig<P> {
     fn with(module: Shared, line: SecondLine<P, u8>) -> Self {
         Self {
             module,
