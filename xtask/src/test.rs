@@ -19,7 +19,7 @@ use crate::{
     adding, bench, build, command, fuzz, group, images, lint, peers, simulated, size, table,
 };
 
-/// The tests of images that run at corners: of these boards, in these targets.
+/// The tests of images: of these boards, in these targets.
 const IMAGES: [(&Board, &str); 3] = [
     (&MODIO_02, "--test=image"),
     (&MODIO_08, "--test=image_08"),
@@ -80,7 +80,8 @@ enum Run {
 type OfBoard = fn(&mut Workspace, &'static Board) -> Result<()>;
 
 /// The steps in the order in which they run: command, name, description, function. The names do not change. A step that
-/// runs for each board has the board's number or name at the end of its name, such as `image-02` or `image-eth-io5r`.
+/// runs for each board has the board's number or name at the end of its name, such as `image-02` or `image-eth-io5r`. The
+/// name without it, `image`, means all of them.
 const STEPS: [(In, &str, &str, Run); 24] = [
     (Ci, "fmt", "formatting", Once(lint::formatting)),
     (Ci, "lint-host", "lints, host", Once(lint::host)),
@@ -131,7 +132,7 @@ const STEPS: [(In, &str, &str, Run); 24] = [
     (
         Ci,
         "adding",
-        "the module of docs/adding-a-module.md",
+        "the module and the board of the documents",
         Once(adding::check),
     ),
     (Ci, "fuzz", "fuzz targets, briefly", Once(fuzz::check)),
@@ -166,46 +167,64 @@ pub struct Chosen {
     install_packages: bool,
 }
 
-/// A step, for one board if its function is for each: command, name, description, function.
-type Step = (In, String, String, Box<Function>);
+/// A step, for one board if its function is for each.
+struct Step {
+    part_of: In,
+    /// Its name in [`STEPS`], which the steps of all boards share.
+    all: &'static str,
+    name: String,
+    what: String,
+    run: Box<Function>,
+}
+
 type Function = dyn Fn(&mut Workspace) -> Result<()>;
+
+impl Step {
+    fn is(&self, name: &str) -> bool {
+        [self.all, &self.name].contains(&name)
+    }
+}
 
 fn all() -> Vec<Step> {
     let short = |board: &'static Board| (board.name.trim_start_matches("modio-"), board);
-    let mut all: Vec<Step> = Vec::new();
-    for (part_of, name, what, run) in STEPS {
+    let mut steps = Vec::new();
+    for (part_of, all, what, run) in STEPS {
         let (run, boards) = match run {
             Once(run) => {
-                all.push((part_of, name.to_owned(), what.to_owned(), Box::new(run)));
+                steps.push(Step {
+                    part_of,
+                    all,
+                    name: all.to_owned(),
+                    what: what.to_owned(),
+                    run: Box::new(run),
+                });
                 continue;
             }
             Each(run) => (run, Board::ALL.map(short).to_vec()),
             EachOfModio(run) => (run, MODIO.map(short).to_vec()),
             EachPart(run) => (run, lint::PARTS.to_vec()),
         };
-        for (of, board) in boards {
-            let run = Box::new(move |workspace: &mut Workspace| run(workspace, board));
-            all.push((
-                part_of,
-                format!("{name}-{of}"),
-                format!("{what}, {board}"),
-                run,
-            ));
-        }
+        steps.extend(boards.into_iter().map(|(of, board)| Step {
+            part_of,
+            all,
+            name: format!("{all}-{of}"),
+            what: format!("{what}, {board}"),
+            run: Box::new(move |workspace: &mut Workspace| run(workspace, board)),
+        }));
     }
-    all
+    steps
 }
 
 /// Returns the steps of these names, in the order of [`STEPS`], or the steps of the command if there are no names.
 fn chosen(names: &[String], command: In) -> Result<Vec<Step>> {
     let mut all = all();
-    let unknown = |name: &&String| !all.iter().any(|step| step.1 == **name);
+    let unknown = |name: &&String| !all.iter().any(|step| step.is(name));
     if let Some(name) = names.iter().find(unknown) {
         return Err(usage(format!("no step {name:?}; --list shows the steps")));
     }
-    all.retain(|(part_of, name, ..)| match names {
-        [] => *part_of <= command,
-        names => names.contains(name),
+    all.retain(|step| match names {
+        [] => step.part_of <= command,
+        names => names.iter().any(|name| step.is(name)),
     });
     Ok(all)
 }
@@ -225,14 +244,14 @@ pub fn ci(workspace: &mut Workspace, options: &Chosen) -> Result<()> {
 impl Chosen {
     fn run(&self, workspace: &mut Workspace, command: In) -> Result<()> {
         if self.list {
-            let rows = all().into_iter().map(|(part_of, name, what, _)| {
-                let part_of = match part_of {
+            let rows = all().into_iter().map(|step| {
+                let part_of = match step.part_of {
                     Host => "test --host, test, ci",
                     Test => "test, ci",
                     Ci => "ci",
                     Night => "the nightly workflow",
                 };
-                [name, part_of.to_owned(), what]
+                [step.name, part_of.to_owned(), step.what]
             });
             say!("{}", table::text(&["step", "runs in", "what"], rows));
             return Ok(());
@@ -242,7 +261,10 @@ impl Chosen {
         let is_ci = !matches!(env::var("CI").as_deref(), Err(_) | Ok("" | "0" | "false"));
         let strict = command == Ci || is_ci;
         let mut done: Vec<Done> = Vec::new();
-        for (_, name, what, run) in chosen(&self.names, command)? {
+        for Step {
+            name, what, run, ..
+        } in chosen(&self.names, command)?
+        {
             group::not_interrupted()?;
             done.push(steps::timed(&name, &what, strict, || run(workspace)));
         }
@@ -265,11 +287,11 @@ fn image(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
 }
 
 fn sim(workspace: &mut Workspace) -> Result<()> {
-    let tests = "--bin=modio-sim --test=command --test=image --test=image_08 --test=image_fx3u";
     // The image that runs alone, which is beside the others.
     build::image(workspace, &MODIO_02)?;
-    let boards = [&MODIO_02, &MODIO_08, &FX3U_24];
-    simulated::run(workspace, &boards, tests, "", &[])
+    let (boards, tests) = (IMAGES.map(|(board, _)| board), IMAGES.map(|(_, test)| test));
+    let tests = format!("--bin=modio-sim --test=command {}", tests.join(" "));
+    simulated::run(workspace, &boards, &tests, "", &[])
 }
 
 fn suite(workspace: &mut Workspace) -> Result<()> {
@@ -318,7 +340,7 @@ mod tests {
     fn names(names: &[&str], command: In) -> Result<Vec<String>> {
         let names: Vec<String> = names.iter().map(ToString::to_string).collect();
         let chosen = chosen(&names, command)?;
-        Ok(chosen.into_iter().map(|step| step.1).collect())
+        Ok(chosen.into_iter().map(|step| step.name).collect())
     }
 
     #[test]
@@ -331,6 +353,11 @@ mod tests {
             names(&["size-08", "fmt"], Test).unwrap(),
             ["fmt", "size-08"]
         );
+        assert_eq!(
+            names(&["bench"], Test).unwrap(),
+            ["bench-02", "bench-08"],
+            "without the boards"
+        );
         let error = names(&["no-step"], Test).unwrap_err();
         assert!(error.is::<crate::error::Usage>(), "{error}");
     }
@@ -340,10 +367,15 @@ mod tests {
         let of_ci = include_str!("../../.github/workflows/ci.yml");
         let nightly = include_str!("../../.github/workflows/nightly.yml");
         let mut seen = BTreeSet::new();
-        for (part_of, name, ..) in all() {
-            let workflow = if part_of == Night { nightly } else { of_ci };
+        for step in all() {
+            let workflow = if step.part_of == Night {
+                nightly
+            } else {
+                of_ci
+            };
             let mut words = workflow.split_whitespace();
-            assert!(words.any(|word| word == name), "no job runs {name}");
+            let name = &step.name;
+            assert!(words.any(|word| step.is(word)), "no job runs {name}");
             assert!(seen.insert(name.clone()), "{name} is the name of two steps");
         }
     }

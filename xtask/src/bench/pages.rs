@@ -4,9 +4,10 @@
 use std::path::Path;
 
 use fs_err as fs;
-use register_map::board::{MODIO_02, MODIO_08};
 use register_map::part::{FLASH_BASE, RAM_BASE};
 use serde_json::Value;
+
+use crate::renode::MODIO;
 
 fn read(path: &str) -> String {
     let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
@@ -76,7 +77,7 @@ fn picture_of_a_request_has_the_figures_of_the_baseline() {
 
 #[test]
 fn picture_of_the_memory_has_the_sizes_of_the_baselines() {
-    for board in [&MODIO_02, &MODIO_08] {
+    for board in MODIO {
         let bench = Baseline::of(board.name);
         let [flash, ram] = ["flash", "ram"].map(|key| bench.figure("image", key));
         let end = u64::from(FLASH_BASE) + flash;
