@@ -1,44 +1,62 @@
-//! The step `adding`: adds the module of `docs/adding-a-module.md` to a copy of the project, and tests it there.
+//! The step `adding`: adds the module of `docs/adding-a-module.md` and the board of `docs/porting.md` to a copy of the
+//! project, and tests them there: the suite runs on the new board, with every module.
 //!
-//! The page and this step use the same patch, so the page cannot be out of date.
+//! The pages and this step use the same patches, so the pages cannot be out of date.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::Result;
 use fs_err as fs;
-use register_map::board::MODIO_02;
 
+use crate::command;
+use crate::toolchain::TARGET;
 use crate::workspace::{ALL, SUITE, Workspace};
-use crate::{command, images};
 
-const PATCH: &str = "docs/adding-a-module.patch";
+/// A page can be a patch, too: git skips the text between its blocks.
+const PATCHES: [&str; 2] = ["docs/adding-a-module.patch", "docs/porting.md"];
 
-/// The packages with files in the patch.
-const PACKAGES: [&str; 3] = ["firmware", "modio-drivers", "register-map"];
+/// The packages with files in the patches and with tests of the rows.
+const PACKAGES: [&str; 4] = ["board-support", "firmware", "modio-drivers", "register-map"];
 
-/// The test of the conformance suite that reads and writes the points of every module.
-const TEST: &str = "a_modio_02_conforms_with_every_module";
+/// The new board.
+const BOARD: &str = "modio-04";
 
-/// Writes the generated documents and tests the changed packages, then runs the suite on the image with every module.
+/// What xtask and the conformance suite test: that every board is in the generated documents and in the workflows, and
+/// that the points of every module can be read and written.
+const TESTS: [&str; 3] = [
+    "docs::tests::the_files_are_up_to_date",
+    "matrix_of_every_board_runs_at_night",
+    "a_board_conforms_with_every_module",
+];
+
+/// Writes the generated documents and tests the changed packages, then runs the suite on the image of the new board.
 pub fn check(workspace: &mut Workspace) -> Result<()> {
-    let mut copy = patched(workspace)?;
-    let mut docs = Command::new(copy.program("xtask")?);
-    // The variable of the cargo that runs this process names the project.
-    docs.env_remove("CARGO_MANIFEST_DIR");
-    command::run(docs.arg("docs").current_dir(&copy.root))?;
+    let copy = patched(workspace)?;
+    let program = copy.program("xtask")?;
+    let xtask = || {
+        let mut xtask = Command::new(&program);
+        // The variable of the cargo that runs this process names the project.
+        xtask.env_remove("CARGO_MANIFEST_DIR");
+        xtask.env("CARGO_BUILD_BUILD_DIR", &workspace.target);
+        xtask.current_dir(&copy.root);
+        xtask
+    };
+    command::run(xtask().arg("docs"))?;
     let mut host = copy.cargo("test");
     host.args(PACKAGES.map(|package| format!("--package={package}")));
     // Without the tests of the store, which take longest.
     command::run(host.args(["--lib", "--test=blocks"]))?;
-    let images = images::variables(&mut copy, &[&MODIO_02])?;
+    command::run(xtask().args(["build", "--board", BOARD]))?;
     let mut simulated = copy.cargo("test");
     simulated.args(ALL).args(["--features", SUITE]);
-    simulated.args(["--test=suite", "--", "--include-ignored", TEST]);
-    command::run(simulated.envs(images))
+    simulated.args(["--bin=xtask", "--test=suite", "--", "--include-ignored"]);
+    simulated.args(TESTS).env("MODIO_BOARD", BOARD);
+    let images = copy.target.join(BOARD).join(TARGET).join("firmware");
+    command::run(simulated.env("MODIO_IMAGES_MODIO_04", images))
 }
 
-/// Returns a copy of the project with the patch. Its build uses the dependencies that are already compiled for the
+/// Returns a copy of the project with the patches. Its build uses the dependencies that are already compiled for the
 /// project.
 fn patched(workspace: &Workspace) -> Result<Workspace> {
     let root = workspace.root.join("target").join("adding");
@@ -60,7 +78,7 @@ fn patched(workspace: &Workspace) -> Result<Workspace> {
     let mut git = Command::new("git");
     // The copy is in a directory that git ignores, so git must not look for the repository.
     git.env("GIT_CEILING_DIRECTORIES", workspace.root.join("target"));
-    command::run(git.current_dir(&root).args(["apply", PATCH]))?;
+    command::run(git.current_dir(&root).arg("apply").args(PATCHES))?;
     let shared = format!("build.build-dir={:?}", workspace.target);
     let mut copy = workspace.with(root.join("target"), vec!["--config".to_owned(), shared]);
     copy.root = root;
@@ -86,8 +104,15 @@ mod tests {
 
     /// A run without a test would pass.
     #[test]
-    fn the_test_of_every_module_exists() {
-        let suite = include_str!("../../tools/conformance/tests/suite/main.rs");
-        assert!(suite.contains(&format!("fn {TEST}()")));
+    fn the_tests_exist() {
+        let files = [
+            include_str!("docs.rs"),
+            include_str!("workflows.rs"),
+            include_str!("../../tools/conformance/tests/suite/main.rs"),
+        ];
+        for (file, test) in files.into_iter().zip(TESTS) {
+            let (_, name) = test.rsplit_once("::").unwrap_or(("", test));
+            assert!(file.contains(&format!("fn {name}()")), "{test}");
+        }
     }
 }

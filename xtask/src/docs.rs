@@ -66,7 +66,7 @@ const CONFIGURATION_NOTES: &str = "
 ";
 
 const SECOND_NOTES: &str = "
-The second line is a radio on a modio-02 and modio-08, and the RS-232 socket on an fx3u. An eth-io5r has none: exception 02.
+The second line is a radio on a modio-02 and modio-08, and the RS-232 socket on an fx3u. Other boards have none: exception 02.
 Over a radio the gaps are always 0. On RS-232 those shorter than 3 ms may be missed.
 ";
 

@@ -14,6 +14,7 @@ use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
+use conformance::bench::Bench;
 use conformance::case::{Case, Need, case};
 use conformance::cases::all;
 use conformance::cli::waits;
@@ -58,6 +59,13 @@ fn modio_02(module: Module) -> Fitting {
     }
 }
 
+/// Returns the board with slots on which the tests run that need another module each time: the modio-02, or that of the
+/// variable `MODIO_BOARD`.
+fn with_slots() -> &'static Board {
+    let named = env::var("MODIO_BOARD");
+    named.map_or(&MODIO_02, |name| name.parse().expect("a board"))
+}
+
 /// Returns all boards but the modio-02, on which the tests of modules, rates and modes run.
 fn others() -> impl Iterator<Item = &'static Board> + Send {
     Board::ALL.into_iter().filter(|board| **board != MODIO_02)
@@ -98,9 +106,19 @@ fn probed(endpoint: &mut dyn Endpoint, dip: u8, mode: Mode) -> Target {
     probe(endpoint, &given).expect("the unit answers")
 }
 
-/// Runs these cases against the unit at `dip`.
-fn outcomes(endpoint: &mut dyn Endpoint, dip: u8, mode: Mode, cases: &[Case]) -> Vec<Outcome> {
-    let target = probed(endpoint, dip, mode);
+/// The unit answers with the code, the name and the model of this board.
+fn assert_is(board: &'static Board, endpoint: &mut dyn Endpoint, target: &Target) {
+    let found = target.modio.and_then(|modio| modio.board);
+    assert_eq!(found, Some(board), "register BOARD");
+    let mut bench = Bench::new(endpoint, target);
+    for (object, text) in [(4, board.name), (5, board.model)] {
+        let reply = bench.reply(&[0x2B, 0x0E, 4, object]).expect("a reply");
+        assert_eq!(reply.get(9..), Some(text.as_bytes()), "object {object}");
+    }
+}
+
+/// Runs these cases against the unit.
+fn outcomes(endpoint: &mut dyn Endpoint, target: &Target, cases: &[Case]) -> Vec<Outcome> {
     // A restart begins the count of the free stack anew, so the cases that restart the unit are last.
     let restarts = |case: &&Case| {
         let mut needs = case.needs.iter();
@@ -109,7 +127,7 @@ fn outcomes(endpoint: &mut dyn Endpoint, dip: u8, mode: Mode, cases: &[Case]) ->
     let (last, first): (Vec<&Case>, Vec<&Case>) = cases.iter().partition(restarts);
     let cases = first.into_iter().chain([&STACK]).chain(last);
     let cases: Vec<Case> = cases.copied().collect();
-    run(endpoint, &target, &cases).expect("the endpoint works")
+    run(endpoint, target, &cases).expect("the endpoint works")
 }
 
 /// At least a KiB of the stack was never used since the start.
@@ -128,7 +146,9 @@ const STACK: Case = case(
 
 fn in_process(fitting: &Fitting, cases: &[Case]) -> Vec<Outcome> {
     let mut endpoint = start(fitting).expect("the image can be read");
-    outcomes(&mut endpoint, fitting.dip, fitting.mode, cases)
+    let target = probed(&mut endpoint, fitting.dip, fitting.mode);
+    assert_is(fitting.board, &mut endpoint, &target);
+    outcomes(&mut endpoint, &target, cases)
 }
 
 /// A row for each case that failed.
@@ -191,7 +211,8 @@ impl Simulator {
 
     fn outcomes(&self, cases: &[Case]) -> Vec<Outcome> {
         let mut endpoint = Tcp::connect(&self.address).expect("the simulator listens");
-        outcomes(&mut endpoint, 1, Mode::Rtu, cases)
+        let target = probed(&mut endpoint, 1, Mode::Rtu);
+        outcomes(&mut endpoint, &target, cases)
     }
 }
 
@@ -265,11 +286,15 @@ const OF_POINTS: [&str; 14] = [
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_modio_02_conforms_with_every_module() {
-    let cases = named(&OF_POINTS);
-    Module::ALL
-        .into_par_iter()
-        .for_each(|module| conforms(&modio_02(module), &cases, 40));
+fn a_board_conforms_with_every_module() {
+    let (board, cases) = (of(with_slots()), named(&OF_POINTS));
+    Module::ALL.into_par_iter().for_each(|module| {
+        let fitting = Fitting {
+            module,
+            ..board.clone()
+        };
+        conforms(&fitting, &cases, 40);
+    });
 }
 
 #[test]

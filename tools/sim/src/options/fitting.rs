@@ -241,8 +241,8 @@ mod tests {
                 "line 3: unknown field `modul`",
             ),
             (
-                "[[board]]\ndip = 1\nboard = 'modio-04'",
-                "board 1: 'modio-04' is",
+                "[[board]]\ndip = 1\nboard = 'nucleo'",
+                "board 1: 'nucleo' is",
             ),
             ("[[board]]\ndip = 1\nmodule = '8di'", "board 1: '8di' is"),
             ("[[board]]\ndip = 1\nslots = { x = '4do' }", "3=4do"),

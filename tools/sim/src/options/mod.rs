@@ -305,7 +305,7 @@ mod tests {
             (&["--unit", "5", "--rs232", "x"][..], "cannot be used with"),
             (&["--bus", "x", "--rs232", "x"][..], "cannot be used with"),
             (&["--lora"][..], "--lora <LINK>"),
-            (&["--board", "modio-04"][..], "modio-02, modio-08"),
+            (&["--board", "nucleo"][..], "modio-02, modio-08"),
             (&["--slot", "4do"][..], "3=4do"),
             (&["--slot", "x=4do"][..], "3=4do"),
             (&["--slot", "3=8di"][..], "one of none, 4di"),
