@@ -5,7 +5,7 @@
 use std::{env, fs, path::PathBuf};
 
 use register_map::{
-    Board,
+    Row,
     board::MODIO_02,
     layout::{HEADER, LOADER, LOADER_KEYS},
     part::{FLASH_BASE, RAM_BASE},
@@ -29,7 +29,7 @@ fn main() {
     println!("cargo::rerun-if-changed=memory");
     println!("cargo::rerun-if-changed=build.rs");
     let is_target = env::var("CARGO_CFG_TARGET_OS").as_deref() == Ok("none");
-    let boards: Vec<_> = Board::ALL
+    let boards: Vec<_> = Row::ALL
         .into_iter()
         .filter(|board| is_on(board.name))
         .collect();
@@ -70,7 +70,7 @@ fn is_on(feature: &str) -> bool {
 }
 
 /// Returns the linker script of an image for a board.
-fn memory(board: &Board) -> String {
+fn memory(board: &Row) -> String {
     let (memory, layout) = (board.memory(), board.layout());
     // The application alone must fit every part that the board can have.
     let (part, ram) = (memory.part, memory.least().ram);

@@ -4,7 +4,7 @@
 use std::{env, fs, path::PathBuf};
 
 use modio_description::{FILE, HEAD, PORT_BYTES, checksum};
-use register_map::{Board, Module};
+use register_map::{Module, Row};
 
 fn main() {
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
@@ -41,7 +41,7 @@ fn type_of(board: &str) -> String {
 /// the firmware adds.
 fn self_descriptions() -> String {
     let mut rows = String::new();
-    for board in Board::ALL {
+    for board in Row::ALL {
         let document =
             modio_description::describe(board, env!("CARGO_PKG_VERSION"), |_| Module::None)
                 .encode();
@@ -61,6 +61,6 @@ const PORT_BYTES: usize = {PORT_BYTES};
 const BOARDS: [Fixed; {}] = [
 {rows}];
 ",
-        Board::ALL.len(),
+        Row::ALL.len(),
     )
 }

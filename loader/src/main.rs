@@ -26,7 +26,7 @@ use cortex_m_rt::{entry, exception};
 use loader::genuine::{self, Key};
 use ports::pages::WriteError;
 use register_map::{
-    Board,
+    Row,
     layout::HEADER,
     update::{Header, Reason, Slot, intact, keys},
 };
@@ -44,7 +44,7 @@ static NUMBERS: [u8; keys::BYTES] = include!(concat!(env!("OUT_DIR"), "/numbers.
 const DEVELOPMENT: bool = include!(concat!(env!("OUT_DIR"), "/development.rs"));
 
 /// The board that the loader is built for.
-const BOARD: &Board = match Board::named(board_support::boards::BOARD.name) {
+const BOARD: &Row = match Row::named(board_support::boards::BOARD.name) {
     Some(board) => board,
     None => panic!("crate register-map has no row for this board"),
 };

@@ -73,7 +73,7 @@ mod tests {
 
     #[test]
     fn every_part_has_two_equal_slots_of_whole_pages() {
-        let of = |board: &crate::Board| {
+        let of = |board: &crate::Row| {
             let Layout {
                 slots: [a, b],
                 slot,

@@ -53,7 +53,7 @@ mod value;
 mod values;
 
 pub use block::{Block, Scope, Text};
-pub use board::Row as Board;
+pub use board::{Board, Row};
 pub use commit::first_32_bits;
 pub use fixed::FixedPort;
 #[doc(hidden)]

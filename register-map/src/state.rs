@@ -6,7 +6,7 @@ use crate::block::block;
 use crate::codes::{ChannelStatus, ModuleState};
 use crate::rule::Rule;
 use crate::value::Value;
-use crate::{Board, Module};
+use crate::{Module, Row};
 
 const READ: Rule = Rule::read_only();
 
@@ -128,7 +128,7 @@ block! {
     /// This map
     MAP_VERSION "register-map version": 0x0204 x 1, Value::NUMBER, READ;
     /// Board
-    BOARD "board": 0x0205 x 1, Value::Codes(&Board::NAMES), READ;
+    BOARD "board": 0x0205 x 1, Value::Codes(&Row::NAMES), READ;
     /// DIP switch at the start
     UNIT_ADDRESS "unit address": 0x0206 x 1, Value::NUMBER, READ;
     /// Why the device last started

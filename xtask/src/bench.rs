@@ -9,7 +9,7 @@ use std::process::Command;
 use anyhow::{Context as _, Result, ensure};
 use fs_err as fs;
 use register_map::layout::HEADER;
-use register_map::{Board, update::Slot};
+use register_map::{Row, update::Slot};
 use serde_json::{Value, json};
 
 use crate::workspace::{self, Workspace};
@@ -60,13 +60,13 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
 }
 
 /// The step of `cargo xtask ci`.
-pub fn check(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
+pub fn check(workspace: &mut Workspace, board: &'static Row) -> Result<()> {
     let build = build::Options { board };
     let (json, bless) = (false, false);
     run(workspace, &Options { build, json, bless })
 }
 
-fn measure(workspace: &mut Workspace, board: &'static Board) -> Result<Value> {
+fn measure(workspace: &mut Workspace, board: &'static Row) -> Result<Value> {
     let loader = build::loader(workspace, board)?;
     let image = signed::image(workspace, board)?;
     let elf = build::image(workspace, board)?;

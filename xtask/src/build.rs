@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use cargo_metadata::PackageId;
 use fs_err as fs;
-use register_map::Board;
+use register_map::Row;
 use register_map::board::MODIO_02;
 use register_map::update::Slot;
 
@@ -23,9 +23,9 @@ pub const PROFILE: &str = "firmware";
 #[group(skip)]
 pub struct Options {
     /// The board
-    #[arg(help = format!("The board: {}", Board::ALL.map(|board| board.name).join(", ")))]
+    #[arg(help = format!("The board: {}", Row::ALL.map(|board| board.name).join(", ")))]
     #[arg(long, value_name = "NAME", default_value_t = &MODIO_02)]
-    pub board: &'static Board,
+    pub board: &'static Row,
 }
 
 /// The board, and an image for it.
@@ -46,7 +46,7 @@ impl Given {
         self.elf.is_some()
     }
 
-    pub fn board(&self) -> &'static Board {
+    pub fn board(&self) -> &'static Row {
         self.options.board
     }
 
@@ -82,12 +82,12 @@ pub struct Built {
 }
 
 /// Builds the image that runs without a loader, and returns its ELF file.
-pub fn image(workspace: &mut Workspace, board: &Board) -> Result<PathBuf> {
+pub fn image(workspace: &mut Workspace, board: &Row) -> Result<PathBuf> {
     Ok(program(workspace, board, Program::Alone, None)?.elf)
 }
 
 /// Builds the loader, and returns its ELF file.
-pub fn loader(workspace: &mut Workspace, board: &Board) -> Result<PathBuf> {
+pub fn loader(workspace: &mut Workspace, board: &Row) -> Result<PathBuf> {
     // A build script could only panic.
     keys::Pair::of(workspace)?;
     Ok(program(workspace, board, Program::Loader, None)?.elf)
@@ -97,7 +97,7 @@ pub fn loader(workspace: &mut Workspace, board: &Board) -> Result<PathBuf> {
 /// RAM needs no flash. Writes the flash from 0x0800_0000 on to a .bin.
 pub fn program(
     workspace: &mut Workspace,
-    board: &Board,
+    board: &Row,
     program: Program,
     map: Option<&Path>,
 ) -> Result<Built> {
@@ -157,7 +157,7 @@ pub fn slot(letter: &str) -> Result<Slot, String> {
 
 /// Returns the target directory of a board. The images have the same name, so each board has a separate directory:
 /// building for one board does not replace the image of the other.
-pub fn target(directory: &Path, board: &Board) -> PathBuf {
+pub fn target(directory: &Path, board: &Row) -> PathBuf {
     if *board == MODIO_02 {
         directory.to_owned()
     } else {

@@ -8,7 +8,7 @@ use std::process::Command;
 use anyhow::Result;
 use ed25519_dalek::SigningKey;
 use fs_err as fs;
-use register_map::Board;
+use register_map::Row;
 use sha2::{Digest as _, Sha256};
 
 use crate::error::usage;
@@ -120,7 +120,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<()> {
         }
         (Some((_, file)), ..) => {
             workspace.keys = Some(file.clone());
-            for board in Board::ALL {
+            for board in Row::ALL {
                 let mut release = board::Files {
                     workspace: &mut *workspace,
                     sources: &sources,

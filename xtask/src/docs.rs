@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use register_map::points::Kind;
 use register_map::{
-    BLOCKS, Block, Board, Field, InForce, Module, Rule, Scope, Text, Unit, Value, Values, codes,
+    BLOCKS, Block, Field, InForce, Module, Row, Rule, Scope, Text, Unit, Value, Values, codes,
     configuration, counters, deadband, edges, fault, links, points, second,
 };
 
@@ -317,7 +317,7 @@ fn write_points(out: &mut impl Write) -> Result {
          a module\ndoes not have, are exception 02. The boards have slots at these ports:\n\n\
          | board | ports | points |\n|---|---|---|\n",
     )?;
-    for board in Board::ALL {
+    for board in Row::ALL {
         let (ports, points) = (board.ports(), board.points());
         let last = |range: &Range<u16>| range.end.wrapping_sub(1);
         write!(out, "| {board} | {}", ports.start)?;
@@ -387,7 +387,7 @@ fn write_readings(out: &mut impl Write) -> Result {
 
 fn write_store(out: &mut impl Write) -> Result {
     out.write_str("\nA save goes to two flash pages: ")?;
-    for (i, board) in Board::ALL.iter().enumerate() {
+    for (i, board) in Row::ALL.iter().enumerate() {
         let loaded = board.layout().store;
         let [first, second] = loaded.addresses();
         let separator = if i == 0 { "" } else { "; " };

@@ -12,7 +12,7 @@ use fs_err as fs;
 use register_map::layout::{HEADER, TwoPages};
 use register_map::part::FLASH_BASE;
 use register_map::update::{Header, Slot};
-use register_map::{Board, record};
+use register_map::{Row, record};
 
 use crate::error::usage;
 use crate::workspace::Workspace;
@@ -97,7 +97,7 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
 }
 
 /// Returns whether a board has a loader: a slot begins with the header of an image.
-fn holds_loader(board: &Board, read: impl Fn(u32, u32) -> Result<Vec<u8>>) -> Result<bool> {
+fn holds_loader(board: &Row, read: impl Fn(u32, u32) -> Result<Vec<u8>>) -> Result<bool> {
     let [a, b] = board.layout().slots.map(|slot| {
         let header = read(slot, HEADER)?;
         Ok::<_, anyhow::Error>(Header::of(&header).is_ok())
@@ -110,7 +110,7 @@ fn holds_loader(board: &Board, read: impl Fn(u32, u32) -> Result<Vec<u8>>) -> Re
 /// alone and an image in a slot may store the settings in different pages. `is_alone`: the image to be written runs
 /// without a loader. `holds_loader`: the board has a loader now.
 fn settings(
-    board: &Board,
+    board: &Row,
     is_alone: bool,
     holds_loader: bool,
     read: impl Fn(u32, u32) -> Result<Vec<u8>>,
@@ -135,7 +135,7 @@ fn settings(
 
 /// Returns what is written for a slot: the loader, the image, and erased pages: the boot state, and the first page of
 /// the other slot.
-pub fn loaded(board: &Board, slot: Slot, loader: Vec<u8>, image: Vec<u8>) -> Regions {
+pub fn loaded(board: &Row, slot: Slot, loader: Vec<u8>, image: Vec<u8>) -> Regions {
     let own = board.layout().slots[slot as usize];
     let mut regions = vec![(FLASH_BASE, loader), (own, image)];
     regions.extend(forgotten(board, slot.other()));
@@ -144,7 +144,7 @@ pub fn loaded(board: &Board, slot: Slot, loader: Vec<u8>, image: Vec<u8>) -> Reg
 }
 
 /// Returns erased pages: the first one of a slot, and the boot state.
-fn forgotten(board: &Board, slot: Slot) -> [(u32, Vec<u8>); 2] {
+fn forgotten(board: &Row, slot: Slot) -> [(u32, Vec<u8>); 2] {
     let layout = board.layout();
     let erased = |pages: u32| vec![0xFF; (pages * layout.boot.bytes) as usize];
     [

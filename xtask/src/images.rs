@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::Result;
-use register_map::Board;
+use register_map::Row;
 
 use crate::build::{self, Options};
 use crate::signed;
@@ -19,7 +19,7 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
 
 /// Builds every program of a board, and returns the files: the loader, the application for both slots, the file of an
 /// update that has them, signed with the development key, and the image that runs alone.
-pub fn all(workspace: &mut Workspace, board: &'static Board) -> Result<Vec<PathBuf>> {
+pub fn all(workspace: &mut Workspace, board: &'static Row) -> Result<Vec<PathBuf>> {
     let loader = build::loader(workspace, board)?;
     let ([a, b], update) = signed::update(workspace, board)?;
     let slots = [a, b].map(|image| image.with_extension(""));
@@ -32,7 +32,7 @@ pub fn all(workspace: &mut Workspace, board: &'static Board) -> Result<Vec<PathB
 /// tests find the directory of these files.
 pub fn variables(
     workspace: &mut Workspace,
-    boards: &[&'static Board],
+    boards: &[&'static Row],
 ) -> Result<Vec<(String, PathBuf)>> {
     let mut directories = Vec::new();
     for board in boards {

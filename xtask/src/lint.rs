@@ -3,7 +3,7 @@
 use std::process::Command;
 
 use anyhow::Result;
-use register_map::Board;
+use register_map::Row;
 use register_map::board::{FX3U_24, MODIO_02};
 
 use crate::workspace::{ALL, Workspace};
@@ -11,7 +11,7 @@ use crate::{bench, build, command, fuzz, peers};
 
 /// The parts of the boards, each with the board for which its programs are checked. The two differ in every feature of
 /// firmware and of the HAL. What only a board has are its pins, which are compiled for every board.
-pub const PARTS: [(&str, &Board); 2] = [("small", &MODIO_02), ("large", &FX3U_24)];
+pub const PARTS: [(&str, &Row); 2] = [("small", &MODIO_02), ("large", &FX3U_24)];
 
 /// The programs for the microcontroller, each with its packages. They need different features of board-support.
 const PROGRAMS: [(&str, &str); 2] = [
@@ -51,7 +51,7 @@ fn for_target(
     workspace: &mut Workspace,
     subcommand: &str,
     program: &str,
-    board: &Board,
+    board: &Row,
 ) -> Result<Command> {
     let mut cargo = workspace.target_cargo(subcommand)?;
     cargo.args(["--profile", build::PROFILE]);
@@ -60,7 +60,7 @@ fn for_target(
     Ok(cargo)
 }
 
-pub fn target(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
+pub fn target(workspace: &mut Workspace, board: &'static Row) -> Result<()> {
     for (program, packages) in PROGRAMS {
         let mut cargo = for_target(workspace, "clippy", program, board)?;
         for package in packages.split(' ') {
@@ -94,7 +94,7 @@ pub fn doc_host(workspace: &mut Workspace) -> Result<()> {
     documentation(cargo)
 }
 
-pub fn doc_target(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
+pub fn doc_target(workspace: &mut Workspace, board: &'static Row) -> Result<()> {
     for (program, _) in PROGRAMS {
         let mut cargo = for_target(workspace, "doc", program, board)?;
         cargo.args(["--package", "board-support", "--package", program]);
@@ -109,8 +109,8 @@ mod tests {
 
     #[test]
     fn every_part_is_checked_and_with_slots_and_without() {
-        let checked = |is: &dyn Fn(&Board) -> bool| PARTS.iter().any(|(_, board)| is(board));
-        for board in Board::ALL {
+        let checked = |is: &dyn Fn(&Row) -> bool| PARTS.iter().any(|(_, board)| is(board));
+        for board in Row::ALL {
             let part = board.memory().part;
             assert!(
                 checked(&|of| of.memory().part.flash == part.flash),

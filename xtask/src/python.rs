@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context as _, Result, ensure};
-use register_map::Board;
+use register_map::Row;
 use register_map::board::{FX3U_14, FX3U_24, MODIO_02, MODIO_08};
 
 use crate::error::missing;
@@ -126,7 +126,7 @@ fn script(
     workspace: &mut Workspace,
     interpreter: &Path,
     name: &str,
-    boards: &[&'static Board],
+    boards: &[&'static Row],
 ) -> Result<Command> {
     let python = python(interpreter);
     let mut script = match ordinary::words()? {

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use fs_err as fs;
 use register_map::board::{MODIO_02, MODIO_08};
-use register_map::{Board, Module};
+use register_map::{Module, Row};
 use serde_json::json;
 
 use crate::workspace::Workspace;
@@ -27,7 +27,7 @@ mod tests;
 use find::Renode;
 
 /// The boards that Renode and the bench have.
-pub const MODIO: [&Board; 2] = [&MODIO_02, &MODIO_08];
+pub const MODIO: [&Row; 2] = [&MODIO_02, &MODIO_08];
 
 /// The platform, the scripts and the suites, relative to the root.
 const DIRECTORY: &str = "renode";
@@ -108,7 +108,7 @@ struct Setup {
     directory: PathBuf,
     /// Directory of the results.
     output: PathBuf,
-    board: &'static Board,
+    board: &'static Row,
     renode: Renode,
     /// The loader, or the image that runs without one.
     elf: PathBuf,

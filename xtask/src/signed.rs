@@ -8,7 +8,7 @@ use fs_err as fs;
 use register_map::layout::HEADER;
 use register_map::part::FLASH_BASE;
 use register_map::update::{BLOCK_BYTES, Manifest, Slot, crc32, intact};
-use register_map::{Board, first_32_bits};
+use register_map::{Row, first_32_bits};
 use sha2::{Digest as _, Sha512};
 
 use crate::build::Program;
@@ -151,14 +151,14 @@ pub fn again(workspace: &mut Workspace, options: &Again) -> Result<()> {
 
 /// Builds the images for both slots, signs them with the development key, and makes the file of an update. Returns the
 /// files of the images, A first, and that file.
-pub fn update(workspace: &mut Workspace, board: &Board) -> Result<([PathBuf; 2], PathBuf)> {
+pub fn update(workspace: &mut Workspace, board: &Row) -> Result<([PathBuf; 2], PathBuf)> {
     let signer = How::default().signer(workspace)?;
     update_by(workspace, board, &signer, None)
 }
 
 fn update_by(
     workspace: &mut Workspace,
-    board: &Board,
+    board: &Row,
     signer: &Signer,
     output: Option<&Path>,
 ) -> Result<([PathBuf; 2], PathBuf)> {
@@ -172,7 +172,7 @@ fn update_by(
 }
 
 /// Builds the image for slot A, signs it with the development key, and returns its file.
-pub fn image(workspace: &mut Workspace, board: &Board) -> Result<PathBuf> {
+pub fn image(workspace: &mut Workspace, board: &Row) -> Result<PathBuf> {
     let signer = How::default().signer(workspace)?;
     image_by(workspace, board, Slot::A, &signer)
 }
@@ -180,7 +180,7 @@ pub fn image(workspace: &mut Workspace, board: &Board) -> Result<PathBuf> {
 /// Builds the image for a slot, signs it, and returns its file.
 pub fn image_by(
     workspace: &mut Workspace,
-    board: &Board,
+    board: &Row,
     slot: Slot,
     signer: &Signer,
 ) -> Result<PathBuf> {
@@ -195,7 +195,7 @@ pub fn image_by(
 }
 
 /// Returns the image for a slot, not signed yet: the header, and the application in an ELF file.
-pub fn unsigned(board: &Board, slot: Slot, elf: &[u8], sources: &Sources) -> Result<Vec<u8>> {
+pub fn unsigned(board: &Row, slot: Slot, elf: &[u8], sources: &Sources) -> Result<Vec<u8>> {
     let layout = board.layout();
     let address = layout.slots[slot as usize];
     let mut flash = image::flat(elf, board.memory().part.flash)?;

@@ -5,7 +5,7 @@ use std::ffi::OsString;
 use std::process::Command;
 
 use anyhow::Result;
-use register_map::Board;
+use register_map::Row;
 
 use crate::workspace::Workspace;
 use crate::{build, command, signed};
@@ -30,7 +30,7 @@ pub fn run(workspace: &mut Workspace, arguments: &[OsString]) -> Result<()> {
 }
 
 /// Returns kind and board of a file that a line of the simulator names, or `None`: it may print its help instead.
-fn missing_file(line: &str) -> Option<(&str, &'static Board)> {
+fn missing_file(line: &str) -> Option<(&str, &'static Row)> {
     let (kind, board) = line.split_once(' ')?;
     Some((kind, board.parse().ok()?))
 }

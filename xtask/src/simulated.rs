@@ -3,7 +3,7 @@
 use std::process::Stdio;
 
 use anyhow::{Result, bail};
-use register_map::Board;
+use register_map::Row;
 
 use crate::workspace::{ALL, SUITE, Workspace};
 use crate::{command, images, ordinary};
@@ -16,7 +16,7 @@ pub const CORNER: &str = "MODIO_CORNER";
 /// an option of the tests. The variables choose the corner of the part, and how long a test is.
 pub fn run(
     workspace: &mut Workspace,
-    boards: &[&'static Board],
+    boards: &[&'static Row],
     targets: &str,
     names: &str,
     variables: &[(&str, &str)],

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
-use register_map::Board;
+use register_map::Row;
 use register_map::layout::{HEADER, LOADER};
 use register_map::part::FLASH_BASE;
 use register_map::update::Slot;
@@ -45,7 +45,7 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
 }
 
 /// Shows what is left of the loader and of each image of a board. Fails when one exceeds its limit.
-pub fn check(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
+pub fn check(workspace: &mut Workspace, board: &'static Row) -> Result<()> {
     let loader = build::loader(workspace, board)?;
     let [flash, _] = of(&loader)?.total();
     say!("loader: {} bytes of flash left", left(LOADER, flash));
@@ -86,7 +86,7 @@ fn of(elf: &Path) -> Result<Sizes> {
 
 /// Returns the bytes of flash and of RAM that an image may take: flash of its slot, or of the smallest part without the
 /// store when it runs alone, and the RAM that the stack leaves.
-pub fn limit(board: &Board, slot: Option<Slot>) -> Bytes {
+pub fn limit(board: &Row, slot: Option<Slot>) -> Bytes {
     let flash = match slot {
         Some(_) => board.layout().slot - HEADER,
         None => board.store().first - FLASH_BASE,

@@ -7,7 +7,7 @@ use std::thread;
 use In::{Ci, Host, Night, Test};
 use Run::{Each, EachOfModio, EachPart, Once};
 use anyhow::{Result, ensure};
-use register_map::Board;
+use register_map::Row;
 use register_map::board::{FX3U_24, MODIO_02, MODIO_08};
 
 use crate::error::{missing, usage};
@@ -20,7 +20,7 @@ use crate::{
 };
 
 /// The tests of images: of these boards, in these targets.
-const IMAGES: [(&Board, &str); 3] = [
+const IMAGES: [(&Row, &str); 3] = [
     (&MODIO_02, "--test=image"),
     (&MODIO_08, "--test=image_08"),
     (&FX3U_24, "--test=image_fx3u"),
@@ -77,7 +77,7 @@ enum Run {
     EachPart(OfBoard),
 }
 
-type OfBoard = fn(&mut Workspace, &'static Board) -> Result<()>;
+type OfBoard = fn(&mut Workspace, &'static Row) -> Result<()>;
 
 /// The steps in the order in which they run: command, name, description, function. The names do not change. A step that
 /// runs for each board has the board's number or name at the end of its name, such as `image-02` or `image-eth-io5r`. The
@@ -186,7 +186,7 @@ impl Step {
 }
 
 fn all() -> Vec<Step> {
-    let short = |board: &'static Board| (board.name.trim_start_matches("modio-"), board);
+    let short = |board: &'static Row| (board.name.trim_start_matches("modio-"), board);
     let mut steps = Vec::new();
     for (part_of, all, what, run) in STEPS {
         let (run, boards) = match run {
@@ -200,7 +200,7 @@ fn all() -> Vec<Step> {
                 });
                 continue;
             }
-            Each(run) => (run, Board::ALL.map(short).to_vec()),
+            Each(run) => (run, Row::ALL.map(short).to_vec()),
             EachOfModio(run) => (run, MODIO.map(short).to_vec()),
             EachPart(run) => (run, lint::PARTS.to_vec()),
         };
@@ -282,7 +282,7 @@ fn unit(workspace: &mut Workspace) -> Result<()> {
     command::run(cargo.arg("--no-fail-fast"))
 }
 
-fn image(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
+fn image(workspace: &mut Workspace, board: &'static Row) -> Result<()> {
     images::all(workspace, board).map(drop)
 }
 
@@ -295,7 +295,7 @@ fn sim(workspace: &mut Workspace) -> Result<()> {
 }
 
 fn suite(workspace: &mut Workspace) -> Result<()> {
-    simulated::run(workspace, &Board::ALL, "--test=suite", "", &[])
+    simulated::run(workspace, &Row::ALL, "--test=suite", "", &[])
 }
 
 fn tool(workspace: &mut Workspace) -> Result<()> {

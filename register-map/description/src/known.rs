@@ -2,7 +2,7 @@
 
 use register_map::points::{self, Kind};
 use register_map::state::MAP_VERSION_VALUE;
-use register_map::{Access, Board, FixedPort, InForce, Module, Rule, Text, configuration, state};
+use register_map::{Access, FixedPort, InForce, Module, Row, Rule, Text, configuration, state};
 
 use crate::{
     Description, Field, ModuleType, Narrower, PointKind, Port, Reading, Register, Scope, Table,
@@ -20,7 +20,7 @@ const KINDS: [Kind; 5] = [
 
 /// Describes a unit of this board with firmware of this version. `module` returns the module in force at a port, 1
 /// to 8.
-pub fn describe(board: &Board, firmware: &str, module: impl Fn(u16) -> Module) -> Description {
+pub fn describe(board: &Row, firmware: &str, module: impl Fn(u16) -> Module) -> Description {
     Description {
         board: board.name.to_owned(),
         model: board.model.to_owned(),
@@ -43,7 +43,7 @@ pub fn describe(board: &Board, firmware: &str, module: impl Fn(u16) -> Module) -
     }
 }
 
-fn register(board: &Board, rule: &Rule, text: &Text) -> Register {
+fn register(board: &Row, rule: &Rule, text: &Text) -> Register {
     Register {
         address: rule.first,
         count: rule.count,

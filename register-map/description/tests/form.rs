@@ -7,7 +7,7 @@ use modio_description::{
 };
 use proptest::prelude::*;
 use register_map::board::{MODIO_02, MODIO_08};
-use register_map::{Board, Module};
+use register_map::{Module, Row};
 
 fn unit(module: Module) -> Description {
     describe(&MODIO_02, "0.1.0", |_| module)
@@ -20,7 +20,7 @@ fn register<'a>(unit: &'a Description, name: &str) -> &'a Register {
 
 #[test]
 fn every_board_with_every_module_round_trips() {
-    for board in Board::ALL {
+    for board in Row::ALL {
         for module in Module::ALL {
             let unit = describe(board, "1.2.3", |_| module);
             assert_eq!(Description::decode(&unit.encode()), Ok(unit.clone()));
@@ -63,7 +63,7 @@ fn the_file_begins_with_length_and_crc() {
 
 #[test]
 fn pages_name_the_sizes_of_the_files_of_all_boards() {
-    let lengths = Board::ALL.map(|board| {
+    let lengths = Row::ALL.map(|board| {
         let unit = describe(board, env!("CARGO_PKG_VERSION"), |_| Module::None);
         unit.file().len()
     });

@@ -1,6 +1,6 @@
 //! The time that the loader takes.
 
-use register_map::Board as Map;
+use register_map::Row;
 use register_map::part::FLASH_BASE;
 use serde::Serialize;
 use sim::board::Layout;
@@ -29,7 +29,7 @@ pub struct Boot {
 /// # Errors
 ///
 /// When the image does not start.
-pub fn measure(loader: &Image, image: &[u8], board: &Map) -> Result<Vec<Boot>, String> {
+pub fn measure(loader: &Image, image: &[u8], board: &Row) -> Result<Vec<Boot>, String> {
     let corners = [(Corner::Nominal, "nominal"), (Corner::Slow, "slow")];
     corners
         .into_iter()
@@ -40,7 +40,7 @@ pub fn measure(loader: &Image, image: &[u8], board: &Map) -> Result<Vec<Boot>, S
 fn at(
     loader: &Image,
     image: &[u8],
-    map: &Map,
+    map: &Row,
     corner: Corner,
     name: &'static str,
 ) -> Result<Boot, String> {

@@ -14,7 +14,6 @@ pub mod unit;
 use std::collections::BTreeMap;
 
 use rayon::prelude::*;
-use register_map::Board;
 use serde::Serialize;
 use sim::{Corner, Image};
 
@@ -57,7 +56,7 @@ pub struct Report {
 pub fn measure(
     image: &Image,
     (loader, signed): (&Image, &[u8]),
-    board: &Board,
+    board: &register_map::Row,
     rivals: &[(String, Image)],
 ) -> Result<Report, String> {
     // Each case has another virtual part, so they can run on all cores of the host.
@@ -82,7 +81,11 @@ pub fn measure(
     })
 }
 
-fn requests(image: &Image, board: &Board, rivals: &[(String, Image)]) -> Result<Vec<Row>, String> {
+fn requests(
+    image: &Image,
+    board: &register_map::Row,
+    rivals: &[(String, Image)],
+) -> Result<Vec<Row>, String> {
     let mut units: BTreeMap<(&str, u16), Unit> = BTreeMap::new();
     let mut rivals = rivals
         .iter()

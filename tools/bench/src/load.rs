@@ -3,7 +3,7 @@
 
 use register_map::codes::Mode;
 use register_map::configuration::BETA;
-use register_map::{Board, Module};
+use register_map::{Module, Row};
 use serde::Serialize;
 use sim::{Corner, Image, Time};
 
@@ -47,7 +47,7 @@ pub struct Load {
 /// When the unit does not answer a request.
 pub fn measure(
     image: &Image,
-    board: &Board,
+    board: &Row,
     corner: Corner,
     hundreds: u16,
     long: bool,

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
-use register_map::Board;
+use register_map::Row;
 use sim::Image;
 
 /// Measures the release image on the virtual board and prints the figures as JSON
@@ -15,7 +15,7 @@ struct Cli {
     elf: PathBuf,
     /// The board that it is for: modio-02 or modio-08
     #[arg(long, value_name = "NAME")]
-    board: &'static Board,
+    board: &'static Row,
     /// The loader
     #[arg(long, value_name = "ELF")]
     loader: PathBuf,

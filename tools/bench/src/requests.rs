@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use register_map::codes::Mode;
 use register_map::configuration::{BETA, FILTER, KEY, OPENING_KEY};
-use register_map::{Board, Module};
+use register_map::{Module, Row};
 
 /// Address of the unit.
 pub const UNIT: u8 = 1;
@@ -88,7 +88,7 @@ fn settings(count: usize) -> Vec<u8> {
 
 /// Returns all requests for a board.
 #[must_use]
-pub fn all(board: &Board) -> Vec<Request> {
+pub fn all(board: &Row) -> Vec<Request> {
     let mut requests = of_any_board(board.points().start);
     if board.slots > 1 {
         requests.extend(of_all_slots(board));
@@ -101,7 +101,7 @@ pub fn all(board: &Board) -> Vec<Request> {
 }
 
 /// Returns the requests for the points of all slots of a board.
-fn of_all_slots(board: &Board) -> Vec<Request> {
+fn of_all_slots(board: &Row) -> Vec<Request> {
     let points = board.points();
     let count = points.end - points.start;
     let request = |name: &str, most, module, pdu| Request {
@@ -324,7 +324,7 @@ mod tests {
 
     #[test]
     fn requests_are_frames_and_settings_are_allowed() {
-        for board in Board::ALL {
+        for board in Row::ALL {
             let mut names = BTreeSet::new();
             for request in all(board) {
                 assert!(request.pdu.len() <= 253, "{}", request.name);

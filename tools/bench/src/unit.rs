@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use register_map::codes::Mode;
-use register_map::{Board as Map, Module, configuration};
+use register_map::{Module, Row, configuration};
 use serde::Serialize;
 use sim::board::Layout;
 use sim::line::{Format, Settings, frame_silence};
@@ -73,7 +73,7 @@ impl Unit {
     /// When the image does not fit the board.
     pub fn new(
         image: &Image,
-        board: &Map,
+        board: &Row,
         module: Module,
         corner: Corner,
         hundreds: u16,

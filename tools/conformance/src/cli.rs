@@ -58,9 +58,9 @@ pub struct Cli {
 
     /// The simulated board, which the image must be for
     #[cfg(feature = "sim")]
-    #[arg(help = format!("The simulated board, which the image must be for: {}", register_map::Board::ALL.map(|board| board.name).join(", ")))]
+    #[arg(help = format!("The simulated board, which the image must be for: {}", register_map::Row::ALL.map(|board| board.name).join(", ")))]
     #[arg(long, value_name = "NAME", default_value_t = &register_map::board::MODIO_02, conflicts_with_all = ["serial", "tcp", "exact_line"])]
-    pub board: &'static register_map::Board,
+    pub board: &'static register_map::Row,
 
     /// The module in the first slot: that of the simulated board [default: 4do], or that which a real board must have
     #[arg(long, value_name = "NAME")]

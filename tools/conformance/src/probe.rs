@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use anyhow::{Context as _, Result, bail, ensure};
 use register_map::points::{self, Kind, output_values};
-use register_map::{BLOCKS, Board, Module, Rule, Values, codes, configuration, links, state};
+use register_map::{BLOCKS, Module, Row, Rule, Values, codes, configuration, links, state};
 
 use crate::case::Check;
 use crate::endpoint::Endpoint;
@@ -176,7 +176,7 @@ fn ping(target: &Target, has: impl Fn(u8) -> bool) -> Option<Vec<u8>> {
 
 /// Reads from a modio's registers what the modio has, and how much longer than t3.5 its reply may take.
 fn modio(tester: &mut Tester<'_>) -> Check<Target> {
-    let board = Board::from_code(tester.read_word(state::BOARD)?);
+    let board = Row::from_code(tester.read_word(state::BOARD)?);
     let codes = tester.read_words(Span::of(state::MODULE_IN_FORCE, points::PORTS))?;
     let mut modules = [Module::None; points::PORTS as usize];
     for (module, code) in modules.iter_mut().zip(codes) {

@@ -7,7 +7,7 @@ use std::time::Duration;
 use modbus_line::LineFormat;
 use register_map::codes::{Baud, Format};
 use register_map::points::{self, Kind};
-use register_map::{Board, Module};
+use register_map::{Module, Row};
 
 use crate::frame::Mode;
 use crate::hil::Hil;
@@ -112,7 +112,7 @@ pub enum Support {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Modio {
     /// The board, by its register BOARD; `None` for a board that the register map does not know.
-    pub board: Option<&'static Board>,
+    pub board: Option<&'static Row>,
     /// The modules in force, port 1 first.
     pub modules: [Module; points::PORTS as usize],
 }

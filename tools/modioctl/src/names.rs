@@ -4,7 +4,7 @@ use modio_description::{
     Description, ModuleType, PointKind, Reading, Register, Scope, Table, Unit, Value, Values,
 };
 
-use register_map::Board;
+use register_map::Row;
 use register_map::configuration::MODULE;
 use register_map::points::{CHANNELS, COUNT, PORTS};
 
@@ -333,7 +333,7 @@ fn registers(description: &Description, register: &Register) -> Vec<Item> {
             .collect(),
         Scope::Port => {
             let ports = description.ports.iter().map(|port| u16::from(port.number));
-            let board = Board::named(&description.board);
+            let board = Row::named(&description.board);
             ports
                 .map(|port| {
                     let mut item = item(format!("p{port}.{name}"), port.max(1) - 1);
@@ -397,11 +397,7 @@ fn is_setting(register: &Register) -> bool {
 
 /// Returns the names of a unit with this module in every slot, and with this RANGE and SCALE of every point.
 #[cfg(test)]
-pub fn book(
-    board: &register_map::Board,
-    module: register_map::Module,
-    reading: (u16, u16),
-) -> Book {
+pub fn book(board: &register_map::Row, module: register_map::Module, reading: (u16, u16)) -> Book {
     let description = modio_description::describe(board, "0.1.0", |_| module);
     Book::new(description, vec![reading; 32])
 }

@@ -12,7 +12,7 @@ use modioctl::export::ExportFormat;
 use modioctl::export::{Line, Source, text};
 use modioctl::names::Book;
 use register_map::board::MODIO_02;
-use register_map::{Board, Module};
+use register_map::{Module, Row};
 use serde_json::{Value as Json, json};
 
 /// Calls each function with its payload, as Node-RED does. Prints the payloads of the results; for a message that the
@@ -43,7 +43,7 @@ fn flow(book: Book) -> Vec<Json> {
     serde_json::from_str(&text(ExportFormat::NodeRed, line).unwrap()).unwrap()
 }
 
-fn book(board: &Board, module: Module, range: u16, unit: Option<Unit>) -> Book {
+fn book(board: &Row, module: Module, range: u16, unit: Option<Unit>) -> Book {
     let mut description = describe(board, "0.1.0", |_| module);
     if let Some(unit) = unit {
         for reading in &mut description.kinds[4].readings {

@@ -28,7 +28,7 @@ use register_map::codes::{Command, Format, Mode, Scale, Signal};
 use register_map::edges::log;
 use register_map::points::{self, Kind};
 use register_map::{
-    Access, BLOCKS, Board, Module, Rule, Value, configuration as at, counters, runs, state,
+    Access, BLOCKS, Module, Row, Rule, Value, configuration as at, counters, runs, state,
 };
 
 use crate::Device;
@@ -75,7 +75,7 @@ pub struct Modio {
     pub tripped: Option<Duration>,
     /// The unit has to restart after the reply.
     pub restart: bool,
-    board: &'static Board,
+    board: &'static Row,
     modules: [Module; points::PORTS as usize],
     file: Vec<u16>,
     description_crc: u16,
@@ -91,7 +91,7 @@ pub struct Modio {
 
 impl Modio {
     /// Creates a unit that was switched on just now. `module` returns the module of each slot, 1 to 8.
-    pub fn new(board: &'static Board, module: impl Fn(u16) -> Module) -> Self {
+    pub fn new(board: &'static Row, module: impl Fn(u16) -> Module) -> Self {
         let mut settings = defaults(board);
         for port in board.ports().filter(|port| board.fixed(*port).is_none()) {
             settings.insert(at::module_of(port), module(port).code());
@@ -416,7 +416,7 @@ impl Modio {
 }
 
 /// Returns the factory settings of a board.
-fn defaults(board: &Board) -> BTreeMap<u16, u16> {
+fn defaults(board: &Row) -> BTreeMap<u16, u16> {
     let settings = board.registers().filter(|(rule, _)| {
         rule.access == Access::ReadWrite && runs(counters::RULES, rule.first, 1).is_none()
     });
@@ -440,7 +440,7 @@ fn defaults(board: &Board) -> BTreeMap<u16, u16> {
 }
 
 /// Returns the rule for a register of a board.
-fn rule(board: &Board, address: u16) -> Option<&'static Rule> {
+fn rule(board: &Row, address: u16) -> Option<&'static Rule> {
     let mut rules = board.registers().map(|(rule, _)| rule);
     rules.find(|rule| (rule.first..rule.end()).contains(&address))
 }

@@ -6,7 +6,7 @@ use anyhow::{Context as _, Result};
 use fs_err as fs;
 use object::{Object as _, ObjectSection as _};
 use register_map::part::FLASH_BASE;
-use register_map::{Board, update::Slot};
+use register_map::{Row, update::Slot};
 
 use super::notices::Notices;
 use super::paths::Paths;
@@ -22,7 +22,7 @@ use crate::{flash, hex, signed};
 pub struct Files<'a> {
     pub workspace: &'a mut Workspace,
     pub sources: &'a Sources,
-    pub board: &'static Board,
+    pub board: &'static Row,
     pub out: &'a Path,
     pub paths: &'a Paths,
     pub notices: &'a mut Notices,
@@ -112,13 +112,13 @@ impl Files<'_> {
 }
 
 /// Returns the names of the images of a board, for slot A and for slot B.
-pub fn slots(board: &Board) -> [String; 2] {
+pub fn slots(board: &Row) -> [String; 2] {
     ["a", "b"].map(|letter| format!("{board}-{letter}"))
 }
 
 /// Writes the file of an update with these signed images, and loader and slot A for a programmer. The loader is in the
 /// directory.
-pub fn finish(board: &Board, out: &Path, images: &[Vec<u8>; 2]) -> Result<()> {
+pub fn finish(board: &Row, out: &Path, images: &[Vec<u8>; 2]) -> Result<()> {
     let elf = fs::read(out.join(format!("{board}-loader.elf")))?;
     let loader = image::flat(&elf, board.memory().part.flash)?;
     let entry = image::parse(&elf)?.entry() as u32;

@@ -8,7 +8,7 @@ use std::path::Path;
 use anyhow::{Context as _, Result, ensure};
 use fs_err as fs;
 use object::build::elf::Builder;
-use register_map::Board;
+use register_map::Row;
 
 use super::notices::Notices;
 use super::{rustc, sbom, sha256};
@@ -36,7 +36,7 @@ pub fn files(
     // Images of an earlier build would be included as well.
     let _ = fs::remove_dir_all(&inside);
     fs::create_dir_all(&inside)?;
-    for board in Board::ALL {
+    for board in Row::ALL {
         for name in [format!("{board}.elf"), format!("{board}-loader.elf")] {
             let elf = stripped(&image::read(&images.join(&name))?)?;
             fs::write(inside.join(name), elf)?;

@@ -6,7 +6,7 @@ use anyhow::{Context as _, Result, ensure};
 use fs_err as fs;
 use register_map::layout::HEADER;
 use register_map::update::{Slot, crc32, intact};
-use register_map::{Board, first_32_bits};
+use register_map::{Row, first_32_bits};
 use sha2::{Digest as _, Sha512};
 
 use super::{board, sums};
@@ -41,7 +41,7 @@ pub fn finish(
             fs::copy(files.join(&name), out.join(&name))?;
         }
     }
-    for board in Board::ALL {
+    for board in Row::ALL {
         let signed = |slot: Slot| {
             let name = &board::slots(board)[slot as usize];
             let of = || -> Result<Vec<u8>> {
@@ -60,7 +60,7 @@ pub fn finish(
 }
 
 /// Refuses an image that is damaged, of another board or slot, or of other sources.
-pub fn check(image: &[u8], board: &Board, slot: Slot, sources: &Sources) -> Result<()> {
+pub fn check(image: &[u8], board: &Row, slot: Slot, sources: &Sources) -> Result<()> {
     let header = intact(image, crc32)
         .ok()
         .context("not an image, or damaged")?;

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use anyhow::{Context as _, Result, ensure};
 use object::{Object as _, ObjectSection as _, SectionKind};
-use register_map::Board;
+use register_map::Row;
 
 use super::{Elf, FLASH_BASE, RAM_BASE, Symbol, demangled};
 
@@ -15,8 +15,8 @@ use super::{Elf, FLASH_BASE, RAM_BASE, Symbol, demangled};
 /// addresses.
 const FLASH: Range<u32> = {
     let (mut bytes, mut n) = (0, 0);
-    while n < Board::ALL.len() {
-        let part = Board::ALL[n].memory().part;
+    while n < Row::ALL.len() {
+        let part = Row::ALL[n].memory().part;
         if part.flash > bytes {
             bytes = part.flash;
         }

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use anyhow::{Result, bail, ensure};
 use fs_err as fs;
-use register_map::Board;
+use register_map::Row;
 
 use super::Setup;
 use crate::group::Group;
@@ -57,7 +57,7 @@ fn to_junit(python: &Path, results: &Path, to: &Path) -> Result<()> {
 
 /// Returns the suites for a board, in the order of their names: those in tests, which are for any board, and those in
 /// the directory there with the name of the board.
-fn all(directory: &Path, board: &Board) -> Result<Vec<PathBuf>> {
+fn all(directory: &Path, board: &Row) -> Result<Vec<PathBuf>> {
     let tests = directory.join("tests");
     // A board need not have separate suites.
     let of_board = fs::read_dir(tests.join(board.name)).into_iter().flatten();

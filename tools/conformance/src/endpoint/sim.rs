@@ -25,7 +25,7 @@ pub struct Fitting {
     /// The file with the image that the loader starts; `None` for an application that runs alone.
     pub image: Option<PathBuf>,
     /// The board.
-    pub board: &'static register_map::Board,
+    pub board: &'static register_map::Row,
     /// The module in the first slot, unless `slots` names that slot.
     pub module: Module,
     /// The modules in the slots of these ports. A slot that is not named is empty.
@@ -42,7 +42,7 @@ pub struct Fitting {
 
 impl Fitting {
     /// Returns a board with this loader, this image and empty slots, set as in the factory: address 1, 9600 8N2, RTU.
-    pub fn new(loader: PathBuf, image: PathBuf, board: &'static register_map::Board) -> Self {
+    pub fn new(loader: PathBuf, image: PathBuf, board: &'static register_map::Row) -> Self {
         Self {
             elf: loader,
             image: Some(image),

@@ -14,7 +14,6 @@ use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use conformance::bench::Bench;
 use conformance::case::{Case, Need, case};
 use conformance::cases::all;
 use conformance::cli::waits;
@@ -26,13 +25,14 @@ use conformance::probe::{Given, probe};
 use conformance::report::table;
 use conformance::run::{Outcome, Verdict, run};
 use conformance::target::Target;
+use conformance::tester::Tester;
 use modbus_line::LineFormat;
 use rayon::iter::{IntoParallelIterator as _, ParallelBridge as _, ParallelIterator as _};
 use register_map::board::{MODIO_02, MODIO_08};
-use register_map::{Board, Module, configuration, state};
+use register_map::{Module, Row, configuration, state};
 
 /// Returns the directory with the loader and the images of a board. `cargo xtask test` sets the variables.
-fn images(board: &Board) -> PathBuf {
+fn images(board: &Row) -> PathBuf {
     let variable = format!(
         "MODIO_IMAGES_{}",
         board.name.to_uppercase().replace('-', "_")
@@ -42,13 +42,13 @@ fn images(board: &Board) -> PathBuf {
 }
 
 /// Returns a board as a user gets it, with the loader and an image in slot A.
-fn of(board: &'static Board) -> Fitting {
+fn of(board: &'static Row) -> Fitting {
     let [loader, image] = files(board);
     Fitting::new(loader, image, board)
 }
 
 /// Returns the loader of a board, and its image.
-fn files(board: &Board) -> [PathBuf; 2] {
+fn files(board: &Row) -> [PathBuf; 2] {
     ["loader", "modio-a.image"].map(|name| images(board).join(name))
 }
 
@@ -61,18 +61,18 @@ fn modio_02(module: Module) -> Fitting {
 
 /// Returns the board with slots on which the tests run that need another module each time: the modio-02, or that of the
 /// variable `MODIO_BOARD`.
-fn with_slots() -> &'static Board {
+fn with_slots() -> &'static Row {
     let named = env::var("MODIO_BOARD");
     named.map_or(&MODIO_02, |name| name.parse().expect("a board"))
 }
 
 /// Returns all boards but the modio-02, on which the tests of modules, rates and modes run.
-fn others() -> impl Iterator<Item = &'static Board> + Send {
-    Board::ALL.into_iter().filter(|board| **board != MODIO_02)
+fn others() -> impl Iterator<Item = &'static Row> + Send {
+    Row::ALL.into_iter().filter(|board| **board != MODIO_02)
 }
 
 /// A board with another module in each slot, if it has slots.
-fn with_different_modules(board: &'static Board) -> Fitting {
+fn with_different_modules(board: &'static Row) -> Fitting {
     let modules = [Module::Di4, Module::Do4, Module::Ai4, Module::Ao4];
     let ports = board.ports().filter(|_| board.fixed.is_empty());
     let ports = ports.map(|port| port as u8);
@@ -107,12 +107,12 @@ fn probed(endpoint: &mut dyn Endpoint, dip: u8, mode: Mode) -> Target {
 }
 
 /// The unit answers with the code, the name and the model of this board.
-fn assert_is(board: &'static Board, endpoint: &mut dyn Endpoint, target: &Target) {
+fn assert_is(board: &'static Row, endpoint: &mut dyn Endpoint, target: &Target) {
     let found = target.modio.and_then(|modio| modio.board);
     assert_eq!(found, Some(board), "register BOARD");
-    let mut bench = Bench::new(endpoint, target);
+    let mut tester = Tester::new(endpoint, target);
     for (object, text) in [(4, board.name), (5, board.model)] {
-        let reply = bench.reply(&[0x2B, 0x0E, 4, object]).expect("a reply");
+        let reply = tester.reply(&[0x2B, 0x0E, 4, object]).expect("a reply");
         assert_eq!(reply.get(9..), Some(text.as_bytes()), "object {object}");
     }
 }

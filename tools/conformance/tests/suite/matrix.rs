@@ -15,7 +15,7 @@ use rayon::iter::{
     IndexedParallelIterator as _, IntoParallelRefIterator as _, ParallelIterator as _,
 };
 use register_map::codes::{self, Baud, Format};
-use register_map::{Board, Module};
+use register_map::{Module, Row};
 
 use super::{failed, in_process, line, of, passed};
 
@@ -47,7 +47,7 @@ pub const LONG: [&str; 7] = [
 ];
 
 /// Returns the board at each rate, format and mode that can be used together.
-fn cells(board: &'static Board, turn: usize) -> Vec<Fitting> {
+fn cells(board: &'static Row, turn: usize) -> Vec<Fitting> {
     let mut cells = Vec::new();
     for (baud, n) in Baud::ALL.iter().zip(turn..) {
         // The modules of a board with several slots differ, and each slot has every module in turn.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use etcetera::BaseStrategy;
 use modio_description::{Description, FILE, HEAD, checksum, describe, records};
 use register_map::configuration::{MODULE, RANGE, SCALE};
-use register_map::{Board, Module, points, state};
+use register_map::{Module, Row, points, state};
 
 use super::{Device, with_modules};
 use crate::failure::Failure;
@@ -104,7 +104,7 @@ pub async fn known(device: &mut Device) -> Result<Option<Description>, Failure> 
         return Ok(None);
     };
     let product = u32::from(high) << 16 | u32::from(low);
-    let Some(board) = Board::from_code(code).filter(|_| product == state::PRODUCT) else {
+    let Some(board) = Row::from_code(code).filter(|_| product == state::PRODUCT) else {
         return Ok(None);
     };
     let modules = device

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::Path;
 
-use register_map::Board;
+use register_map::Row;
 use register_map::layout::HEADER;
 use register_map::state;
 use register_map::update::{BLOCK_BYTES, Header, Manifest, Slot, crc32, intact};
@@ -32,7 +32,7 @@ pub struct Image {
 #[derive(Clone, Debug)]
 pub struct File {
     /// The board.
-    pub board: &'static Board,
+    pub board: &'static Row,
     /// The images for slots A and B.
     pub images: [Image; 2],
 }
@@ -154,11 +154,11 @@ impl File {
 }
 
 /// Checks the image for a slot. Returns its board as well.
-fn image(bytes: &[u8], slot: Slot) -> Result<(&'static Board, Image), String> {
+fn image(bytes: &[u8], slot: Slot) -> Result<(&'static Row, Image), String> {
     let wrong = |what: &str| format!("the image for slot {slot:?} {what}");
     let header = Header::of(bytes).map_err(|_| wrong("has no header"))?;
     let code = header.board();
-    let board = Board::from_code(code.into()).ok_or_else(|| {
+    let board = Row::from_code(code.into()).ok_or_else(|| {
         wrong(&format!(
             "is for board {code}, which this program does not know"
         ))

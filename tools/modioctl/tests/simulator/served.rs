@@ -9,7 +9,7 @@ use std::time::Duration;
 use modbus_reference::{Device, Server};
 use modioctl::bus::adu::{Framing, request_length};
 use register_map::board::MODIO_02;
-use register_map::{Board, Module};
+use register_map::{Module, Row};
 
 /// Serves each connection in a new thread. Returns the address.
 pub fn serve(connection: impl Fn(TcpStream) + Clone + Send + 'static) -> SocketAddr {
@@ -93,7 +93,7 @@ impl Modio {
     }
 
     /// A unit of this board with these modules, whose description the program knows. It has run for a while.
-    pub fn of(board: &'static Board, module: impl Fn(u16) -> Module) -> Self {
+    pub fn of(board: &'static Row, module: impl Fn(u16) -> Module) -> Self {
         let mut modio = modbus_reference::Modio::new(board, module);
         modio.now = Duration::from_secs(1000);
         Self {

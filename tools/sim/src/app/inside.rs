@@ -1,6 +1,6 @@
 //! The files inside the program: loader and images of each board if `cargo xtask dist` has built the program, else none.
 
-use register_map::Board;
+use register_map::Row;
 use sim::board::Layout;
 use sim::{Config, Image, Time};
 
@@ -13,7 +13,7 @@ const LOGGED: Time = Time::from_ms(100);
 /// Returns a file for a board, if the program contains it: `.elf` is the image that runs alone, `-loader.elf` the
 /// loader, `.modio` the images for the slots. It is a copy, because the bytes in the program do not have the alignment
 /// that the ELF reader needs.
-pub fn file(board: &Board, ending: &str) -> Option<Vec<u8>> {
+pub fn file(board: &Row, ending: &str) -> Option<Vec<u8>> {
     let name = format!("{board}{ending}");
     let inside = FILES.iter().find(|(file, _)| *file == name);
     inside.map(|(_, content)| content.to_vec())
@@ -22,7 +22,7 @@ pub fn file(board: &Board, ending: &str) -> Option<Vec<u8>> {
 /// Returns the version of the program, and on a line for each board inside it the version of its firmware.
 pub fn version() -> String {
     let mut text = format!("modio-sim {}\n", register_map::version!());
-    for board in Board::ALL {
+    for board in Row::ALL {
         if let (Some(layout), Some(elf)) = (Layout::of(board), file(board, ".elf")) {
             let version = firmware(layout, &elf).unwrap_or_else(|| "of unknown version".to_owned());
             text += &format!("firmware of the {board}: {version}\n");

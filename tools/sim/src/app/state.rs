@@ -1,6 +1,6 @@
 //! The visible state of a board, as it is in JSON: LEDs, channels, line, log, radio.
 
-use register_map::{Board as Kind, Module, configuration, update::Slot as FlashSlot};
+use register_map::{Module, Row, configuration, update::Slot as FlashSlot};
 use serde::Serialize;
 use sim::Board;
 use sim::radio::{self, Mode};
@@ -189,7 +189,7 @@ impl ToSchema for ModuleName {
 
 /// Names of the types of boards.
 fn board_names() -> RefOr<Schema> {
-    one_of(Kind::ALL.map(|board| board.name))
+    one_of(Row::ALL.map(|board| board.name))
 }
 
 /// Names of the modes of a LoRa module, or null.

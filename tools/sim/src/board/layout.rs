@@ -1,6 +1,6 @@
 //! The types of boards: their parts, slots and pins.
 
-use register_map::{Board, board};
+use register_map::{Row, board};
 
 use crate::board::terminals::Terminal;
 use crate::board::{ETH_IO5R, FX3U_14, FX3U_24};
@@ -57,7 +57,7 @@ pub struct Leds {
 #[derive(Clone, Copy, Debug)]
 pub struct Layout {
     /// The board in the register map: its name, its ports, and the pages in which the configuration is stored.
-    pub board: &'static Board,
+    pub board: &'static Row,
     /// The microcontroller.
     pub part: Part,
     /// The slots. Methods without a port number mean the first one.
@@ -162,12 +162,12 @@ pub const MODIO_08: Layout = Layout {
 
 impl Layout {
     /// All types of boards.
-    const ALL: [&'static Self; Board::ALL.len()] =
+    const ALL: [&'static Self; Row::ALL.len()] =
         [&MODIO_02, &MODIO_08, &FX3U_14, &FX3U_24, &ETH_IO5R];
 
     /// Returns the layout of a board of the register map.
     #[must_use]
-    pub fn of(board: &Board) -> Option<&'static Self> {
+    pub fn of(board: &Row) -> Option<&'static Self> {
         Self::ALL.into_iter().find(|layout| layout.board == board)
     }
 }
@@ -198,7 +198,7 @@ mod tests {
 
     #[test]
     fn every_board_of_the_register_map_has_a_layout_that_matches() {
-        for board in Board::ALL {
+        for board in Row::ALL {
             let layout = Layout::of(board).unwrap();
             assert_eq!(layout.switch.is_empty(), !board.switch, "{board}");
             assert_eq!(

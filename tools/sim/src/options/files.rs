@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use register_map::Board;
+use register_map::Row;
 
 use super::Options;
 use super::values::OfBoard;
@@ -28,7 +28,7 @@ impl Options {
     /// # Errors
     ///
     /// In one line, when the options name an image that runs alone, and also a loader or an image for a slot.
-    pub fn files_of(&self, board: &Board) -> Result<Files<'_>, String> {
+    pub fn files_of(&self, board: &Row) -> Result<Files<'_>, String> {
         let [elf, loader, image] =
             [&self.elf, &self.loader, &self.image].map(|files| last(files, board));
         if elf.is_some() && (loader.is_some() || image.is_some()) {
@@ -47,11 +47,11 @@ impl Options {
     /// # Errors
     ///
     /// In one line, why the simulator cannot run with these options.
-    pub fn missing_files(&self) -> Result<Vec<(&'static str, &'static Board)>, String> {
+    pub fn missing_files(&self) -> Result<Vec<(&'static str, &'static Row)>, String> {
         self.check_line()?;
         let fittings = self.fittings()?;
         let mut missing = Vec::new();
-        for board in Board::ALL {
+        for board in Row::ALL {
             if !fittings.iter().any(|fitting| fitting.board == board) {
                 continue;
             }
@@ -66,8 +66,8 @@ impl Options {
     }
 }
 
-fn last<'a>(files: &'a [OfBoard], board: &Board) -> Option<&'a Path> {
-    let named = |wanted: Option<&Board>| files.iter().rev().find(|(of, _)| *of == wanted);
+fn last<'a>(files: &'a [OfBoard], board: &Row) -> Option<&'a Path> {
+    let named = |wanted: Option<&Row>| files.iter().rev().find(|(of, _)| *of == wanted);
     let (_, path) = named(Some(board)).or_else(|| named(None))?;
     Some(path)
 }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use register_map::{Board, Module, board::MODIO_02};
+use register_map::{Module, Row, board::MODIO_02};
 use serde::Deserialize;
 
 use super::{Options, slot};
@@ -18,7 +18,7 @@ pub struct Fitting {
     /// Name of the board in the HTTP interface.
     pub name: String,
     /// Type of the board.
-    pub board: &'static Board,
+    pub board: &'static Row,
     /// DIP switch SW01: bit 0 = position 1.
     pub dip: u8,
     /// Module in the first slot, unless `slots` names that slot.

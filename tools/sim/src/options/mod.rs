@@ -4,7 +4,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use register_map::{Board, Module, board::MODIO_02};
+use register_map::{Module, Row, board::MODIO_02};
 
 use crate::Corner;
 use crate::line::Settings;
@@ -32,8 +32,8 @@ pub struct Options {
 
     /// Type of the board
     #[arg(long, value_name = "NAME", default_value_t = &MODIO_02)]
-    #[arg(help = format!("Type of the board: {}", Board::ALL.map(|board| board.name).join(", ")))]
-    pub board: &'static Board,
+    #[arg(help = format!("Type of the board: {}", Row::ALL.map(|board| board.name).join(", ")))]
+    pub board: &'static Row,
 
     /// Module in the board's first slot
     #[arg(long, value_name = "NAME", default_value = "4di")]

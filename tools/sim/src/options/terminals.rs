@@ -1,6 +1,6 @@
 //! Checks of the pseudo-terminals, and of the options that a system without them needs.
 
-use register_map::{Board, board::Second};
+use register_map::{Row, board::Second};
 
 use super::{Options, PTY};
 
@@ -24,7 +24,7 @@ impl Options {
             }
         }
         if self.rs232.is_some() && !has_socket(self.board) {
-            let boards = Board::ALL.into_iter().filter(|board| has_socket(board));
+            let boards = Row::ALL.into_iter().filter(|board| has_socket(board));
             let boards: Vec<_> = boards.map(|board| board.name).collect();
             return Err(format!(
                 "--rs232 needs a board with an RS-232 socket, {}: the {} has none",
@@ -61,7 +61,7 @@ impl Options {
 }
 
 /// Returns whether a board has an RS-232 socket.
-fn has_socket(board: &Board) -> bool {
+fn has_socket(board: &Row) -> bool {
     board.second == Some(Second::Rs232)
 }
 

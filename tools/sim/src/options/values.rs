@@ -4,17 +4,17 @@ use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::PathBuf;
 
 use modbus_line::RATES;
-use register_map::{Board, Module};
+use register_map::{Module, Row};
 
 use crate::line::{Format, Settings};
 
 /// A file, for boards of one type or of any.
-pub type OfBoard = (Option<&'static Board>, PathBuf);
+pub type OfBoard = (Option<&'static Row>, PathBuf);
 
 /// Parses `FILE` or `BOARD=FILE`. A text in front of `=` that is not the name of a board is part of the file's name.
 pub fn of_board(text: &str) -> Result<OfBoard, String> {
     let named = text.split_once('=').and_then(|(name, file)| {
-        let board: &'static Board = name.parse().ok()?;
+        let board: &'static Row = name.parse().ok()?;
         Some((Some(board), PathBuf::from(file)))
     });
     match named.unwrap_or_else(|| (None, PathBuf::from(text))) {

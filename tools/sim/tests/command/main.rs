@@ -176,7 +176,7 @@ fn assert_preset(board: &[&str], fitting: &[&str], name: &str, settings: &[(u16,
         assert_eq!(running.end(), (Some(0), String::new()));
         fs::read(&flash).unwrap()
     };
-    let known: &register_map::Board = name.parse().unwrap();
+    let known: &register_map::Row = name.parse().unwrap();
     let size = if name == "modio-02" { 128 } else { 256 };
     let bare = run(&["--no-preset"]);
     assert_eq!(bare.len(), size * 1024);

@@ -2,7 +2,7 @@
 
 use modbus_line::adu::{pdu, words_of};
 use modbus_line::fast::Scan;
-use register_map::{Board, state};
+use register_map::{Row, state};
 use serde_json::json;
 
 use super::hex;
@@ -140,7 +140,7 @@ async fn identity(master: &mut Master, serial: u32) -> std::io::Result<String> {
     if let [high, low, version, patch, _, code, .., build] = words[..]
         && u32::from(high) << 16 | u32::from(low) == state::PRODUCT
     {
-        let board = Board::from_code(code).map_or("with an unknown board", |board| board.name);
+        let board = Row::from_code(code).map_or("with an unknown board", |board| board.name);
         let version = state::version([version, patch], build);
         return Ok(format!("modio {board} {version}"));
     }

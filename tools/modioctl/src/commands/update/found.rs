@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use modbus_line::adu;
-use register_map::Board;
+use register_map::Row;
 use register_map::state::{self, BUILD, PRODUCT, PRODUCT_CODE, STATUS, UPDATE, build, update};
 use register_map::update::{Reason, State, status};
 
@@ -19,7 +19,7 @@ pub struct Found {
     /// Its address.
     pub address: u8,
     /// Its board; `None` if it is newer than this program.
-    pub board: Option<&'static Board>,
+    pub board: Option<&'static Row>,
     /// File 2.
     pub status: Status,
     /// The running image is on trial.
@@ -85,7 +85,7 @@ async fn ask(device: &mut Device) -> Result<Found, Failure> {
     };
     Ok(Found {
         address: device.unit,
-        board: Board::from_code(board),
+        board: Row::from_code(board),
         status,
         trial: has(&slots, update::TRIAL),
         unsaved: has(&[condition], state::status::UNSAVED),
