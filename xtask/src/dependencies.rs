@@ -35,8 +35,8 @@ fn dependencies(package: &Package, kind: DependencyKind) -> BTreeSet<&str> {
     dependencies
 }
 
-/// Returns the arrows of a package as the table has them: what a build script or a test uses is an arrow of its own only
-/// if the crate does not depend on it anyway.
+/// Returns the arrows of a package as the table has them: a crate that the package depends on anyway is not listed again
+/// for its build script or its tests.
 fn arrows(package: &Package) -> Vec<String> {
     let normal = dependencies(package, DependencyKind::Normal);
     let build = &dependencies(package, DependencyKind::Build) - &normal;
