@@ -2,7 +2,7 @@
 
 use super::*;
 
-impl<B: Board> Bench<B> {
+impl<B: Board> Rig<B> {
     /// Reads records of a file in one request. Returns the exception, or the bytes of all groups.
     pub(super) fn read_file(&mut self, groups: &[(u16, u16, u16)]) -> Result<Vec<u8>, u8> {
         let mut pdu = std::vec![0x14, groups.len() as u8 * 7];
@@ -44,12 +44,12 @@ impl<B: Board> Bench<B> {
 #[test]
 fn file_1_describes_the_unit_with_its_modules_in_force() {
     for module in Module::ALL {
-        let mut bench = Bench::new(module, &[]);
-        let file = bench.self_description();
+        let mut rig = Rig::new(module, &[]);
+        let file = rig.self_description();
         let expected =
             modio_description::describe(&MODIO_02, env!("CARGO_PKG_VERSION"), |_| module);
         assert_eq!(modio_description::Description::open(&file), Ok(expected));
-        let crc = bench.read(0x020F, 1).unwrap()[0];
+        let crc = rig.read(0x020F, 1).unwrap()[0];
         assert_eq!(crc.to_be_bytes(), file[2..4]);
     }
 }
@@ -57,8 +57,8 @@ fn file_1_describes_the_unit_with_its_modules_in_force() {
 #[test]
 fn file_1_describes_all_slots_of_a_board() {
     let modules = [Module::Ai2Ao2, Module::None, Module::Di4, Module::Relay2];
-    let mut bench = Bench::<Modio08>::on(modules, &[]);
-    let file = bench.self_description();
+    let mut rig = Rig::<Modio08>::on(modules, &[]);
+    let file = rig.self_description();
     let expected = modio_description::describe(&MODIO_08, env!("CARGO_PKG_VERSION"), |port| {
         modules[usize::from(port - 1)]
     });
@@ -67,55 +67,55 @@ fn file_1_describes_all_slots_of_a_board() {
 
 #[test]
 fn module_that_is_not_in_force_does_not_change_file_1() {
-    let mut bench = Bench::new(Module::Di4, &[]);
-    let file = bench.self_description();
-    bench.unlock();
-    assert_eq!(bench.write(at::module_of(5), &[Module::Ao4.code()]), Ok(()));
-    assert_eq!(bench.self_description(), file);
+    let mut rig = Rig::new(Module::Di4, &[]);
+    let file = rig.self_description();
+    rig.unlock();
+    assert_eq!(rig.write(at::module_of(5), &[Module::Ao4.code()]), Ok(()));
+    assert_eq!(rig.self_description(), file);
 }
 
 #[test]
 fn groups_of_one_request_are_read_in_their_order() {
-    let mut bench = Bench::new(Module::Di4, &[]);
-    let file = bench.self_description();
-    let bytes = bench.read_file(&[(1, 5, 2), (1, 0, 1), (1, 5, 1)]).unwrap();
+    let mut rig = Rig::new(Module::Di4, &[]);
+    let file = rig.self_description();
+    let bytes = rig.read_file(&[(1, 5, 2), (1, 0, 1), (1, 5, 1)]).unwrap();
     let expected = [&file[10..14], &file[..2], &file[10..12]].concat();
     assert_eq!(bytes, expected);
     // The longest reply: 251 bytes of groups.
-    let longest = bench.read_file(&[(1, 9, 124)]).unwrap();
+    let longest = rig.read_file(&[(1, 9, 124)]).unwrap();
     assert_eq!(longest, file[18..18 + 248]);
-    assert_eq!(bench.read_file(&[(1, 9, 125)]), Err(3));
+    assert_eq!(rig.read_file(&[(1, 9, 125)]), Err(3));
 }
 
 /// Reading can begin at every record, also at the borders of head, fixed part and ports.
 #[test]
 fn each_record_can_be_read_alone() {
-    let mut bench = Bench::new(Module::Ai2Ao2, &[]);
-    let file = bench.self_description();
+    let mut rig = Rig::new(Module::Ai2Ao2, &[]);
+    let file = rig.self_description();
     for (record, bytes) in (0..).zip(file.chunks(2)) {
-        assert_eq!(bench.read_file(&[(1, record, 1)]).unwrap(), bytes);
+        assert_eq!(rig.read_file(&[(1, record, 1)]).unwrap(), bytes);
     }
 }
 
 #[test]
 fn other_files_return_illegal_data_address() {
-    let mut bench = Bench::new(Module::None, &[]);
+    let mut rig = Rig::new(Module::None, &[]);
     for file in [0, 2, 4, 0x100, 0x101, 0xFFFF] {
-        assert_eq!(bench.read_file(&[(file, 0, 1)]), Err(2), "file {file}");
-        assert_eq!(bench.read_file(&[(1, 0, 1), (file, 0, 1)]), Err(2));
+        assert_eq!(rig.read_file(&[(file, 0, 1)]), Err(2), "file {file}");
+        assert_eq!(rig.read_file(&[(1, 0, 1), (file, 0, 1)]), Err(2));
     }
-    assert_eq!(bench.ask(&[0x14]), [0x94, 3]);
+    assert_eq!(rig.ask(&[0x14]), [0x94, 3]);
 }
 
 #[test]
 fn files_cannot_be_written() {
-    let mut bench = Bench::new(Module::None, &[]);
-    let file = bench.self_description();
+    let mut rig = Rig::new(Module::None, &[]);
+    let file = rig.self_description();
     for number in [1, 2, 0x100] {
         let [f1, f0] = u16::to_be_bytes(number);
         let request = [0x15, 9, 6, f1, f0, 0, 0, 0, 1, 0x12, 0x34];
-        assert_eq!(bench.ask(&request), [0x95, 2], "file {number}");
+        assert_eq!(rig.ask(&request), [0x95, 2], "file {number}");
     }
-    assert_eq!(bench.ask(&[0x15, 9, 6]), [0x95, 3]);
-    assert_eq!(bench.self_description(), file);
+    assert_eq!(rig.ask(&[0x15, 9, 6]), [0x95, 3]);
+    assert_eq!(rig.self_description(), file);
 }

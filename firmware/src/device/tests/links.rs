@@ -17,19 +17,19 @@ fn link(source: u16, action: LinkAction, words: [u16; 2]) -> [u16; 4] {
 }
 
 /// A device with links of point 4, long enough after its start and after their write that they act.
-fn linked(first: [u16; 4], second: [u16; 4]) -> Bench<Modio08> {
-    let mut bench = Bench::<Modio08>::on(MODULES, &[(at::COMM_TIMEOUT, 10)]);
-    bench.unlock();
+fn linked(first: [u16; 4], second: [u16; 4]) -> Rig<Modio08> {
+    let mut rig = Rig::<Modio08>::on(MODULES, &[(at::COMM_TIMEOUT, 10)]);
+    rig.unlock();
     for (second, words) in [(false, first), (true, second)] {
-        assert_eq!(bench.write(links::of_point(OUTPUT, second), &words), Ok(()));
+        assert_eq!(rig.write(links::of_point(OUTPUT, second), &words), Ok(()));
     }
-    bench.pass(1_010);
-    bench
+    rig.pass(1_010);
+    rig
 }
 
 const NONE: [u16; 4] = [0xFFFF, 0, 0, 0];
 
-impl Bench<Modio08> {
+impl Rig<Modio08> {
     /// Scans a digital input with this level.
     fn input(&mut self, channel: usize, level: bool) {
         self.scan_port(0, |channels| channels.set_bit(channel, level));
@@ -55,11 +55,11 @@ impl Bench<Modio08> {
 
 #[test]
 fn links_of_digital_outputs_alone_exist() {
-    let mut bench = linked(NONE, NONE);
-    assert_eq!(bench.read(0x0410, 16).unwrap(), [NONE; 4].as_flattened());
-    assert_eq!(bench.read(0x0490, 16).unwrap(), [NONE; 4].as_flattened());
+    let mut rig = linked(NONE, NONE);
+    assert_eq!(rig.read(0x0410, 16).unwrap(), [NONE; 4].as_flattened());
+    assert_eq!(rig.read(0x0490, 16).unwrap(), [NONE; 4].as_flattened());
     assert_eq!(
-        bench.read(0x0438, 8).unwrap(),
+        rig.read(0x0438, 8).unwrap(),
         [NONE; 2].as_flattened(),
         "relays"
     );
@@ -70,42 +70,38 @@ fn links_of_digital_outputs_alone_exist() {
         (0x0430, 4),
         (0x0440, 4),
     ] {
-        assert_eq!(bench.read(address, count), Err(2), "{address:#06x}");
+        assert_eq!(rig.read(address, count), Err(2), "{address:#06x}");
         assert_eq!(
-            bench.write(address, &std::vec![0; count.into()]),
+            rig.write(address, &std::vec![0; count.into()]),
             Err(2),
             "{address:#06x}"
         );
     }
-    let mut single = Bench::new(Module::Do4, &[]);
+    let mut single = Rig::new(Module::Do4, &[]);
     assert_eq!(single.read(0x0440, 16), Err(2), "a board with one slot");
     assert_eq!(single.write(0x0440, &NONE), Err(2));
 }
 
 #[test]
 fn links_are_locked_and_read_back_as_written() {
-    let mut bench = Bench::<Modio08>::on(MODULES, &[]);
+    let mut rig = Rig::<Modio08>::on(MODULES, &[]);
     let words = link(3, Pulse, [25, 7]);
-    assert_eq!(bench.write(0x0494, &words), Err(6), "locked");
-    assert_eq!(
-        bench.write(0x0494, &[4]),
-        Err(3),
-        "the value before the lock"
-    );
-    bench.unlock();
-    assert_eq!(bench.write(0x0494, &words), Ok(()));
-    assert_eq!(bench.read(0x0494, 4).unwrap(), words);
-    assert_eq!(bench.read(0x020A, 1).unwrap()[0] & 8, 8, "not saved");
-    assert_eq!(bench.write(0x0497, &[0]), Ok(()), "LOW alone");
-    assert_eq!(bench.ask(&[0x16, 4, 0x96, 0xFF, 0, 0, 0x10])[0], 0x16);
-    assert_eq!(bench.read(0x0494, 4).unwrap(), link(3, Pulse, [16, 0]));
-    bench.write(at::COMMAND, &[4]).unwrap();
-    assert_eq!(bench.read(0x0494, 4).unwrap(), NONE);
+    assert_eq!(rig.write(0x0494, &words), Err(6), "locked");
+    assert_eq!(rig.write(0x0494, &[4]), Err(3), "the value before the lock");
+    rig.unlock();
+    assert_eq!(rig.write(0x0494, &words), Ok(()));
+    assert_eq!(rig.read(0x0494, 4).unwrap(), words);
+    assert_eq!(rig.read(0x020A, 1).unwrap()[0] & 8, 8, "not saved");
+    assert_eq!(rig.write(0x0497, &[0]), Ok(()), "LOW alone");
+    assert_eq!(rig.ask(&[0x16, 4, 0x96, 0xFF, 0, 0, 0x10])[0], 0x16);
+    assert_eq!(rig.read(0x0494, 4).unwrap(), link(3, Pulse, [16, 0]));
+    rig.write(at::COMMAND, &[4]).unwrap();
+    assert_eq!(rig.read(0x0494, 4).unwrap(), NONE);
 }
 
 #[test]
 fn a_link_is_checked_as_a_whole() {
-    let mut bench = linked(NONE, NONE);
+    let mut rig = linked(NONE, NONE);
     for bad in [
         [16, 1, 0, 0],
         [4, 1, 0, 0],
@@ -115,151 +111,148 @@ fn a_link_is_checked_as_a_whole() {
         [0, 0x201, 0, 0],
         [0, 4, 0, 0],
     ] {
-        assert_eq!(bench.write(0x0410, &bad), Err(3), "{bad:?}");
+        assert_eq!(rig.write(0x0410, &bad), Err(3), "{bad:?}");
         let two = [bad, NONE].concat();
-        assert_eq!(bench.write(0x0410, &two), Err(3), "{bad:?}");
+        assert_eq!(rig.write(0x0410, &two), Err(3), "{bad:?}");
         let two = [NONE, bad].concat();
-        assert_eq!(bench.write(0x040C, &two), Err(2));
-        assert_eq!(bench.write(0x0410, &two), Err(3), "{bad:?}");
+        assert_eq!(rig.write(0x040C, &two), Err(2));
+        assert_eq!(rig.write(0x0410, &two), Err(3), "{bad:?}");
     }
-    assert_eq!(bench.read(0x0410, 8).unwrap(), [NONE; 2].as_flattened());
+    assert_eq!(rig.read(0x0410, 8).unwrap(), [NONE; 2].as_flattened());
     // One register after another: each must suit the others.
-    bench.write(0x0410, &[ANALOG]).unwrap();
-    assert_eq!(bench.write(0x0413, &[1]), Err(3), "LOW above HIGH");
+    rig.write(0x0410, &[ANALOG]).unwrap();
+    assert_eq!(rig.write(0x0413, &[1]), Err(3), "LOW above HIGH");
     for (address, value) in [(0x0412, 2), (0x0413, 1), (0x0411, 1)] {
-        bench.write(address, &[value]).unwrap();
+        rig.write(address, &[value]).unwrap();
     }
-    assert_eq!(bench.write(0x0411, &[3]), Err(3));
+    assert_eq!(rig.write(0x0411, &[3]), Err(3));
     // The last registers of one link and the first of the next.
-    assert_eq!(bench.write(0x0412, &[1, 1, 3, 3]), Ok(()));
-    assert_eq!(bench.write(0x0413, &[2, 3, 3]), Err(3));
+    assert_eq!(rig.write(0x0412, &[1, 1, 3, 3]), Ok(()));
+    assert_eq!(rig.write(0x0413, &[2, 3, 3]), Err(3));
 }
 
 #[test]
 fn a_link_acts_only_where_a_write_would() {
-    let mut bench = linked(link(0, Set, [0; 2]), NONE);
-    bench.device.points.ports_mut()[1].set_failing(0b0001);
-    bench.press(0);
-    bench.device.points.ports_mut()[1].set_failing(0);
-    assert!(!bench.output());
-    bench.press(0);
-    assert!(bench.output());
+    let mut rig = linked(link(0, Set, [0; 2]), NONE);
+    rig.device.points.ports_mut()[1].set_failing(0b0001);
+    rig.press(0);
+    rig.device.points.ports_mut()[1].set_failing(0);
+    assert!(!rig.output());
+    rig.press(0);
+    assert!(rig.output());
     // The coil of a relay in manual mode, as by a write.
-    bench.write(0x0438, &link(0, Toggle, [0; 2])).unwrap();
-    bench.pass(1_000);
-    bench.scan_port(3, |channels| channels.set_bit(0, true));
-    bench.press(0);
-    assert_eq!(bench.ask(&[1, 0, 14, 0, 1]), [1, 1, 1]);
+    rig.write(0x0438, &link(0, Toggle, [0; 2])).unwrap();
+    rig.pass(1_000);
+    rig.scan_port(3, |channels| channels.set_bit(0, true));
+    rig.press(0);
+    assert_eq!(rig.ask(&[1, 0, 14, 0, 1]), [1, 1, 1]);
 }
 
 #[test]
 fn links_of_a_port_rest_after_a_change_of_its_module() {
-    let mut bench = linked(link(0, Toggle, [0; 2]), NONE);
-    bench.write(0x0414, &link(12, Toggle, [0; 2])).unwrap();
+    let mut rig = linked(link(0, Toggle, [0; 2]), NONE);
+    rig.write(0x0414, &link(12, Toggle, [0; 2])).unwrap();
     // Another module for the sources of the second output.
-    bench
-        .write(at::module_of(4), &[Module::Di4.code()])
-        .unwrap();
-    assert_eq!(bench.read(0x0410, 4).unwrap(), link(0, Toggle, [0; 2]));
-    assert_eq!(bench.read(0x0414, 4).unwrap(), NONE);
-    assert_eq!(bench.read(0x0438, 4), Err(2), "no longer an output");
-    bench.write(0x0414, &link(12, Toggle, [0; 2])).unwrap();
-    bench.pass(1_000);
-    bench.scan_port(3, |channels| channels.set_bit(0, true));
+    rig.write(at::module_of(4), &[Module::Di4.code()]).unwrap();
+    assert_eq!(rig.read(0x0410, 4).unwrap(), link(0, Toggle, [0; 2]));
+    assert_eq!(rig.read(0x0414, 4).unwrap(), NONE);
+    assert_eq!(rig.read(0x0438, 4), Err(2), "no longer an output");
+    rig.write(0x0414, &link(12, Toggle, [0; 2])).unwrap();
+    rig.pass(1_000);
+    rig.scan_port(3, |channels| channels.set_bit(0, true));
     assert_eq!(
-        bench.ask(&[1, 0, 5, 0, 1]),
+        rig.ask(&[1, 0, 5, 0, 1]),
         [1, 1, 0],
         "not before the restart"
     );
-    assert_eq!(bench.press(0), [true, true], "another port");
+    assert_eq!(rig.press(0), [true, true], "another port");
     // Another module for the output.
-    bench
-        .write(at::module_of(2), &[Module::Relay2.code()])
+    rig.write(at::module_of(2), &[Module::Relay2.code()])
         .unwrap();
-    assert_eq!(bench.read(0x0410, 4), Err(2));
-    assert_eq!(bench.read(0x0418, 8).unwrap(), [NONE; 2].as_flattened());
-    bench.write(0x0418, &link(0, Toggle, [0; 2])).unwrap();
-    bench.pass(1_000);
-    bench.press(0);
-    assert_eq!(bench.ask(&[1, 0, 4, 0, 4]), [1, 1, 0b0001]);
+    assert_eq!(rig.read(0x0410, 4), Err(2));
+    assert_eq!(rig.read(0x0418, 8).unwrap(), [NONE; 2].as_flattened());
+    rig.write(0x0418, &link(0, Toggle, [0; 2])).unwrap();
+    rig.pass(1_000);
+    rig.press(0);
+    assert_eq!(rig.ask(&[1, 0, 4, 0, 4]), [1, 1, 0b0001]);
 }
 
 #[test]
 fn write_of_a_link_is_no_edge_whatever_its_inputs_had() {
     // Between the scan of the inputs and the links a request changes the source to an input with another level.
-    let mut bench = linked(link(0, Toggle, [0; 2]), NONE);
-    bench.scan_port(0, |channels| channels.set_bit(1, true));
-    bench.pass(10);
+    let mut rig = linked(link(0, Toggle, [0; 2]), NONE);
+    rig.scan_port(0, |channels| channels.set_bit(1, true));
+    rig.pass(10);
     for source in [1, 0, 1] {
-        bench.device.tick(1);
-        bench.write(0x0410, &[source]).unwrap();
-        bench.scan_port(0, |_| {});
-        bench.pass(1_500);
-        assert!(!bench.output(), "source {source}");
+        rig.device.tick(1);
+        rig.write(0x0410, &[source]).unwrap();
+        rig.scan_port(0, |_| {});
+        rig.pass(1_500);
+        assert!(!rig.output(), "source {source}");
     }
-    assert_eq!(bench.press(1), [false, false], "it was on");
-    assert_eq!(bench.press(1), [true, true]);
+    assert_eq!(rig.press(1), [false, false], "it was on");
+    assert_eq!(rig.press(1), [true, true]);
 }
 
 #[test]
 fn edge_of_a_scan_reaches_a_link_although_a_setting_is_written_before_the_links_run() {
-    let mut bench = linked(link(0, Toggle, [0; 2]), NONE);
+    let mut rig = linked(link(0, Toggle, [0; 2]), NONE);
     // As `Scanning::run` does it: the inputs under one lock, then the links under others. A request is served in between.
-    let mut channels = *bench.device.points.ports()[0].channels();
+    let mut channels = *rig.device.points.ports()[0].channels();
     channels.set_bit(0, true);
-    bench.device.scanned(0, &channels, &[None; 4], true, 1);
-    bench.write(at::RESPONSE_DELAY, &[1]).unwrap();
-    (0..4).for_each(|slot| bench.device.run_links(slot));
-    assert!(bench.output(), "the edge was lost");
+    rig.device.scanned(0, &channels, &[None; 4], true, 1);
+    rig.write(at::RESPONSE_DELAY, &[1]).unwrap();
+    (0..4).for_each(|slot| rig.device.run_links(slot));
+    assert!(rig.output(), "the edge was lost");
 }
 
 #[test]
 fn loaded_defaults_and_dropped_changes_count_as_writes_of_all_links() {
-    let mut bench = linked(link(0, Follow, [0; 2]), NONE);
-    bench.write(at::COMMAND, &[1]).unwrap();
-    bench.device.config.end_save(false);
-    bench.input(0, true);
-    assert!(bench.output());
+    let mut rig = linked(link(0, Follow, [0; 2]), NONE);
+    rig.write(at::COMMAND, &[1]).unwrap();
+    rig.device.config.end_save(false);
+    rig.input(0, true);
+    assert!(rig.output());
     for command in [3, 4] {
-        bench.write(at::COMMAND, &[command]).unwrap();
-        bench.write_output(false);
-        bench.pass(990);
-        assert!(!bench.output(), "it rests after COMMAND {command}");
+        rig.write(at::COMMAND, &[command]).unwrap();
+        rig.write_output(false);
+        rig.pass(990);
+        assert!(!rig.output(), "it rests after COMMAND {command}");
     }
-    bench.pass(10);
-    assert!(bench.output());
+    rig.pass(10);
+    assert!(rig.output());
 }
 
 #[test]
 fn driven_output_never_has_what_a_master_writes_into_a_held_one() {
-    let mut bench = linked(link(0, Follow, [0; 2]), NONE);
-    bench.input(0, true);
+    let mut rig = linked(link(0, Follow, [0; 2]), NONE);
+    rig.input(0, true);
     for _ in 0..3 {
-        bench.write_output(false);
+        rig.write_output(false);
         // The scan that the write causes, which runs no links.
-        assert!(bench.device.driven(1).bit(0));
-        bench.pass(1);
-        assert!(bench.device.driven(1).bit(0) && bench.output());
+        assert!(rig.device.driven(1).bit(0));
+        rig.pass(1);
+        assert!(rig.device.driven(1).bit(0) && rig.output());
     }
     // SAFE is 0, and does not show.
-    let now = bench.device.state.millis();
-    bench.device.request_seen(now, true);
+    let now = rig.device.state.millis();
+    rig.device.request_seen(now, true);
     for _ in 0..1_100 {
-        bench.pass(1);
-        assert!(bench.device.driven(1).bit(0));
+        rig.pass(1);
+        assert!(rig.device.driven(1).bit(0));
     }
-    assert!(bench.device.comm_watchdog.has_expired());
+    assert!(rig.device.comm_watchdog.has_expired());
 }
 
 /// A heater or a fan at point 4, and the codes of its sensor at input 1 of port 3 through the driver of the module.
 struct Sensor {
-    bench: Bench<Modio08>,
+    rig: Rig<Modio08>,
     module: Ai4,
 }
 
 impl Sensor {
     fn new(range: u16, filter: u16, heater: [u16; 4]) -> Self {
-        let mut bench = Bench::<Modio08>::on(
+        let mut rig = Rig::<Modio08>::on(
             MODULES,
             &[
                 (at::FILTER + ANALOG, filter),
@@ -267,10 +260,10 @@ impl Sensor {
                 (at::SCALE + ANALOG, 1),
             ],
         );
-        bench.unlock();
-        bench.write(0x0410, &heater).unwrap();
+        rig.unlock();
+        rig.write(0x0410, &heater).unwrap();
         Self {
-            bench,
+            rig,
             module: Ai4::default(),
         }
     }
@@ -279,7 +272,7 @@ impl Sensor {
     fn scan(&mut self, codes: impl Iterator<Item = u16>) -> usize {
         let mut on = 0;
         for code in codes {
-            let device = &mut self.bench.device;
+            let device = &mut self.rig.device;
             let mut channels = *device.points.ports()[2].channels();
             self.module.configure(device.points.ports()[2].settings());
             let codes = [Some(code), None, None, None];
@@ -340,18 +333,16 @@ fn heater_works_again_a_minute_after_its_sensor_was_mended() {
 
 #[test]
 fn output_is_the_masters_again_after_the_last_link_of_its_slot_has_gone() {
-    let mut bench = linked(link(0, Follow, [0; 2]), NONE);
-    bench.input(0, true);
-    assert!(bench.device.driven(1).bit(0));
+    let mut rig = linked(link(0, Follow, [0; 2]), NONE);
+    rig.input(0, true);
+    assert!(rig.device.driven(1).bit(0));
     // ACTION 0.
-    bench
-        .write(links::of_point(OUTPUT, false) + 1, &[0])
-        .unwrap();
-    bench.pass(2_000);
-    bench.write_output(false);
-    bench.pass(1);
-    assert!(!bench.device.driven(1).bit(0), "the terminal");
-    assert_eq!(bench.device.held_outputs(), 0);
+    rig.write(links::of_point(OUTPUT, false) + 1, &[0]).unwrap();
+    rig.pass(2_000);
+    rig.write_output(false);
+    rig.pass(1);
+    assert!(!rig.device.driven(1).bit(0), "the terminal");
+    assert_eq!(rig.device.held_outputs(), 0);
 }
 
 #[test]

@@ -25,18 +25,18 @@ use super::*;
 use crate::config::Settings;
 
 /// A device with these modules in its slots, these stored settings, and a server.
-struct Bench<B: Board = Modio02> {
+struct Rig<B: Board = Modio02> {
     device: &'static mut Device<B>,
     server: Server,
 }
 
-impl Bench {
+impl Rig {
     fn new(module: Module, settings: &[(u16, u16)]) -> Self {
         Self::on([module], settings)
     }
 }
 
-impl<B: Board> Bench<B> {
+impl<B: Board> Rig<B> {
     fn on<const PORTS: usize>(modules: [Module; PORTS], settings: &[(u16, u16)]) -> Self {
         let ports = B::ROW.ports().map(at::module_of);
         let mut pairs: Vec<_> = ports.zip(modules.map(Module::code)).collect();

@@ -16,8 +16,8 @@ const AS_255: u16 = 0xB007;
 const CODES: [u16; 5] = [PREPARE, 0xB002, CONFIRM, 0xB004, AS_255];
 
 /// Returns a unit with an image in this state in slot A, from which it runs.
-fn bench(own: OfSlot, lora: u16) -> Bench {
-    let bench = Bench::new(Module::Di4, &[(at::LORA, lora)]);
+fn rig(own: OfSlot, lora: u16) -> Rig {
+    let rig = Rig::new(Module::Di4, &[(at::LORA, lora)]);
     let record = Record {
         preferred: Slot::A,
         states: [own, OfSlot::Empty],
@@ -26,14 +26,14 @@ fn bench(own: OfSlot, lora: u16) -> Bench {
     };
     let images = [[0; 10]; 2];
     let update = Update::new(1, &LAYOUT, Slot::A, Some(record), images, [0; 4], false);
-    bench.device.update = Some(update);
-    bench
+    rig.device.update = Some(update);
+    rig
 }
 
 /// Performs the next step of the update, which must be a change of the boot state.
-fn write_state(bench: &mut Bench) {
+fn write_state(rig: &mut Rig) {
     use crate::update::Job;
-    let update = bench.device.update.as_mut().unwrap();
+    let update = rig.device.update.as_mut().unwrap();
     let job = update.next().unwrap();
     assert!(matches!(job, Job::Write(_)));
     update.end(&job, Ok(()), [0; 10]);
@@ -41,21 +41,21 @@ fn write_state(bench: &mut Bench) {
 
 #[test]
 fn unit_without_loader_has_neither_the_orders_nor_the_files() {
-    let mut bench = Bench::new(Module::Di4, &[]);
+    let mut rig = Rig::new(Module::Di4, &[]);
     for code in CODES {
-        assert_eq!(bench.write(at::COMMAND, &[code]), Err(3), "{code:#x}");
-        bench.unlock();
-        assert_eq!(bench.write(at::COMMAND, &[code]), Err(3), "{code:#x}");
+        assert_eq!(rig.write(at::COMMAND, &[code]), Err(3), "{code:#x}");
+        rig.unlock();
+        assert_eq!(rig.write(at::COMMAND, &[code]), Err(3), "{code:#x}");
     }
-    assert_eq!(bench.read(0x022A, 1), Ok(vec![0]));
+    assert_eq!(rig.read(0x022A, 1), Ok(vec![0]));
 }
 
 #[test]
 fn orders_need_the_lock_and_the_units_own_address() {
-    let mut bench = bench(OfSlot::Confirmed, 0);
-    assert_eq!(bench.read(0x022A, 1), Ok(vec![1]));
-    assert_eq!(bench.write(at::COMMAND, &[PREPARE]), Err(6));
-    bench.unlock();
+    let mut rig = rig(OfSlot::Confirmed, 0);
+    assert_eq!(rig.read(0x022A, 1), Ok(vec![1]));
+    assert_eq!(rig.write(at::COMMAND, &[PREPARE]), Err(6));
+    rig.unlock();
     let own = Origin::default();
     let broadcast = Origin {
         broadcast: true,
@@ -66,43 +66,43 @@ fn orders_need_the_lock_and_the_units_own_address() {
         ..own
     };
     for origin in [broadcast, by_serial] {
-        bench.device.set_origin(origin);
+        rig.device.set_origin(origin);
         for code in CODES {
             assert_eq!(
-                bench.write(at::COMMAND, &[code]),
+                rig.write(at::COMMAND, &[code]),
                 Err(6),
                 "{code:#x} {origin:?}"
             );
         }
     }
-    bench.device.set_origin(own);
-    assert_eq!(bench.write(at::COMMAND, &[0xB002]), Err(6), "no blocks");
-    assert_eq!(bench.write(at::COMMAND, &[0xB004]), Err(6), "no image");
-    assert_eq!(bench.write(at::COMMAND, &[PREPARE]), Ok(()));
-    assert_eq!(bench.write(at::COMMAND, &[PREPARE]), Err(6), "under way");
-    assert_eq!(bench.write(at::COMMAND, &[AS_255]), Ok(()));
-    assert_eq!(bench.device.restart, Some(Restart::As255));
+    rig.device.set_origin(own);
+    assert_eq!(rig.write(at::COMMAND, &[0xB002]), Err(6), "no blocks");
+    assert_eq!(rig.write(at::COMMAND, &[0xB004]), Err(6), "no image");
+    assert_eq!(rig.write(at::COMMAND, &[PREPARE]), Ok(()));
+    assert_eq!(rig.write(at::COMMAND, &[PREPARE]), Err(6), "under way");
+    assert_eq!(rig.write(at::COMMAND, &[AS_255]), Ok(()));
+    assert_eq!(rig.device.restart, Some(Restart::As255));
 }
 
 #[test]
 fn preparation_costs_a_save_of_the_budget() {
-    let mut bench = bench(OfSlot::Confirmed, 0);
-    bench.device.config.set_saves_left(1);
-    bench.unlock();
-    assert_eq!(bench.write(at::COMMAND, &[PREPARE]), Ok(()));
-    write_state(&mut bench);
-    assert_eq!(bench.device.config.saves_left(), 0);
-    assert_eq!(bench.write(at::COMMAND, &[PREPARE]), Err(6));
-    bench.device.tick(59_000);
-    bench.unlock();
-    bench.device.tick(1_000);
-    assert_eq!(bench.write(at::COMMAND, &[PREPARE]), Ok(()));
+    let mut rig = rig(OfSlot::Confirmed, 0);
+    rig.device.config.set_saves_left(1);
+    rig.unlock();
+    assert_eq!(rig.write(at::COMMAND, &[PREPARE]), Ok(()));
+    write_state(&mut rig);
+    assert_eq!(rig.device.config.saves_left(), 0);
+    assert_eq!(rig.write(at::COMMAND, &[PREPARE]), Err(6));
+    rig.device.tick(59_000);
+    rig.unlock();
+    rig.device.tick(1_000);
+    assert_eq!(rig.write(at::COMMAND, &[PREPARE]), Ok(()));
 }
 
 #[test]
 fn way_back_costs_a_save_of_the_budget() {
-    let mut bench = bench(OfSlot::Confirmed, 0);
-    let update = bench.device.update.as_mut().unwrap();
+    let mut rig = rig(OfSlot::Confirmed, 0);
+    let update = rig.device.update.as_mut().unwrap();
     let confirmed = [OfSlot::Confirmed; 2];
     *update = Update::new(
         1,
@@ -118,62 +118,62 @@ fn way_back_costs_a_save_of_the_budget() {
         [0; 4],
         false,
     );
-    bench.device.config.set_saves_left(1);
-    bench.unlock();
-    assert_eq!(bench.write(at::COMMAND, &[0xB004]), Ok(()));
-    assert_eq!(bench.device.config.saves_left(), 0);
+    rig.device.config.set_saves_left(1);
+    rig.unlock();
+    assert_eq!(rig.write(at::COMMAND, &[0xB004]), Ok(()));
+    assert_eq!(rig.device.config.saves_left(), 0);
 }
 
 /// Each line's order waits for its own reply, so both may have been checked before one is carried out.
 #[test]
 fn order_that_was_checked_before_an_order_of_the_other_line_is_not_taken() {
-    let mut bench = bench(OfSlot::Confirmed, 1);
-    let before = bench.device.config.saves_left();
+    let mut rig = rig(OfSlot::Confirmed, 1);
+    let before = rig.device.config.saves_left();
     for line in [LineName::Rs485, LineName::Second] {
-        bench.device.carry_out(Command::Prepare, line);
-        assert_eq!(bench.device.config.saves_left(), before - 1);
+        rig.device.carry_out(Command::Prepare, line);
+        assert_eq!(rig.device.config.saves_left(), before - 1);
     }
-    write_state(&mut bench);
-    assert_eq!(bench.device.update.as_ref().unwrap().record(6), 54);
-    bench.unlock();
+    write_state(&mut rig);
+    assert_eq!(rig.device.update.as_ref().unwrap().record(6), 54);
+    rig.unlock();
     // The boot state has changed, so COMMAND 2 does not replace that restart.
-    bench.device.restart = Some(Restart::Update);
-    assert_eq!(bench.write(at::COMMAND, &[2]), Ok(()));
-    assert_eq!(bench.device.restart, Some(Restart::Update));
+    rig.device.restart = Some(Restart::Update);
+    assert_eq!(rig.write(at::COMMAND, &[2]), Ok(()));
+    assert_eq!(rig.device.restart, Some(Restart::Update));
 }
 
 /// After 0xB007 a unit has no radio, so nobody could reach it over the air any more.
 #[test]
 fn preparation_over_the_air_needs_a_radio_with_settings_and_recovery_a_wire() {
     for (lora, answer) in [(1, Ok(())), (2, Err(6))] {
-        let mut bench = bench(OfSlot::Confirmed, lora);
-        bench.device.set_origin(Origin {
+        let mut rig = rig(OfSlot::Confirmed, lora);
+        rig.device.set_origin(Origin {
             line: LineName::Second,
             broadcast: false,
             by_serial: false,
         });
-        let _ = bench.ask(&[6, 1, 0, 0x5A, 0x17]);
-        assert_eq!(bench.write(at::COMMAND, &[PREPARE]), answer);
-        assert_eq!(bench.write(at::COMMAND, &[AS_255]), Err(6));
-        assert_eq!(bench.device.restart, None);
+        let _ = rig.ask(&[6, 1, 0, 0x5A, 0x17]);
+        assert_eq!(rig.write(at::COMMAND, &[PREPARE]), answer);
+        assert_eq!(rig.write(at::COMMAND, &[AS_255]), Err(6));
+        assert_eq!(rig.device.restart, None);
     }
 }
 
 #[test]
 fn image_that_nobody_confirms_restarts_after_15_minutes() {
     for (own, restarts) in [(OfSlot::Trial(1), true), (OfSlot::Confirmed, false)] {
-        let bench = bench(own, 0);
-        bench.device.tick(TRIAL_S * 1000 - 1);
-        assert_eq!(bench.device.restart, None);
-        bench.device.tick(1);
-        assert_eq!(bench.device.restart.is_some(), restarts);
+        let rig = rig(own, 0);
+        rig.device.tick(TRIAL_S * 1000 - 1);
+        assert_eq!(rig.device.restart, None);
+        rig.device.tick(1);
+        assert_eq!(rig.device.restart.is_some(), restarts);
     }
-    let mut bench = bench(OfSlot::Trial(1), 0);
-    bench.unlock();
-    assert_eq!(bench.write(at::COMMAND, &[CONFIRM]), Ok(()));
-    write_state(&mut bench);
-    bench.device.tick(TRIAL_S * 1000);
-    assert_eq!(bench.device.restart, None);
+    let mut rig = rig(OfSlot::Trial(1), 0);
+    rig.unlock();
+    assert_eq!(rig.write(at::COMMAND, &[CONFIRM]), Ok(()));
+    write_state(&mut rig);
+    rig.device.tick(TRIAL_S * 1000);
+    assert_eq!(rig.device.restart, None);
 }
 
 /// Function 15 with a first block of an image for slot B, and zeros.
@@ -188,23 +188,23 @@ fn block() -> Vec<u8> {
 
 #[test]
 fn block_keeps_the_lock_open_and_needs_none() {
-    let mut bench = bench(OfSlot::Confirmed, 0);
-    assert_eq!(bench.ask(&block()), [0x95, 6], "not prepared");
-    bench.unlock();
-    assert_eq!(bench.write(at::COMMAND, &[PREPARE]), Ok(()));
-    write_state(&mut bench);
-    while let Some(job) = bench.device.update.as_ref().unwrap().next() {
-        let update = bench.device.update.as_mut().unwrap();
+    let mut rig = rig(OfSlot::Confirmed, 0);
+    assert_eq!(rig.ask(&block()), [0x95, 6], "not prepared");
+    rig.unlock();
+    assert_eq!(rig.write(at::COMMAND, &[PREPARE]), Ok(()));
+    write_state(&mut rig);
+    while let Some(job) = rig.device.update.as_ref().unwrap().next() {
+        let update = rig.device.update.as_mut().unwrap();
         update.end(&job, Ok(()), [0; 10]);
     }
-    bench.device.tick(59_000);
-    assert_eq!(bench.ask(&block()), block());
-    bench.device.tick(59_000);
-    assert_eq!(bench.read(at::KEY, 1), Ok(vec![1]));
-    bench.device.tick(1_000);
-    assert_eq!(bench.read(at::KEY, 1), Ok(vec![0]));
-    assert_eq!(bench.ask(&block()), block());
-    assert_eq!(bench.read(at::KEY, 1), Ok(vec![0]), "it stays closed");
-    let reply = bench.ask(&[0x14, 7, 6, 0, 2, 0, 0, 0, 4]);
+    rig.device.tick(59_000);
+    assert_eq!(rig.ask(&block()), block());
+    rig.device.tick(59_000);
+    assert_eq!(rig.read(at::KEY, 1), Ok(vec![1]));
+    rig.device.tick(1_000);
+    assert_eq!(rig.read(at::KEY, 1), Ok(vec![0]));
+    assert_eq!(rig.ask(&block()), block());
+    assert_eq!(rig.read(at::KEY, 1), Ok(vec![0]), "it stays closed");
+    let reply = rig.ask(&[0x14, 7, 6, 0, 2, 0, 0, 0, 4]);
     assert_eq!(reply[4..], [0, 1, 0, 0, 0, 8, 0, 8]);
 }
