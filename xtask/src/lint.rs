@@ -6,7 +6,7 @@ use anyhow::Result;
 use register_map::Row;
 use register_map::board::{FX3U_24, MODIO_02};
 
-use crate::workspace::{ALL, Workspace};
+use crate::workspace::{ALL, SUITE, Workspace};
 use crate::{bench, build, command, fuzz, peers};
 
 /// The parts of the boards, each with the board for which its programs are checked. The two differ in every feature of
@@ -42,7 +42,8 @@ fn deny_warnings(mut cargo: Command) -> Result<()> {
 
 pub fn host(workspace: &mut Workspace) -> Result<()> {
     let mut cargo = workspace.cargo("clippy");
-    cargo.args(ALL).arg("--all-targets");
+    // With the code of the suite that is in the simulator only.
+    cargo.args(ALL).args(["--all-targets", "--features", SUITE]);
     deny_warnings(cargo)
 }
 
