@@ -1,4 +1,4 @@
-//! Gives the linker the script of cortex-m-rt, and the code the public keys that it trusts, with their numbers.
+//! Gives the linker the script of cortex-m-rt, and the code the name of the board and the public keys that it trusts, with their numbers.
 
 use std::{env, fs, path::PathBuf};
 
@@ -13,6 +13,10 @@ fn main() {
     println!("cargo::rustc-link-arg-bins=--nmagic");
     println!("cargo::rustc-link-arg-bins=-Tlink.x");
     println!("cargo::rerun-if-changed=build.rs");
+    // From the build script of board-support.
+    if let Ok(board) = env::var("DEP_MODIO_BOARD_BOARD") {
+        println!("cargo::rustc-env=MODIO_BOARD={board}");
+    }
     println!("cargo::rerun-if-env-changed=MODIO_KEYS");
     let file = env::var("MODIO_KEYS").unwrap_or_else(|_| DEVELOPMENT.to_owned());
     println!("cargo::rerun-if-changed={file}");

@@ -44,7 +44,7 @@ static NUMBERS: [u8; keys::BYTES] = include!(concat!(env!("OUT_DIR"), "/numbers.
 const DEVELOPMENT: bool = include!(concat!(env!("OUT_DIR"), "/development.rs"));
 
 /// The board that the loader is built for.
-const BOARD: &Row = match Row::named(board_support::boards::BOARD.name) {
+const BOARD: &Row = match Row::named(env!("MODIO_BOARD")) {
     Some(board) => board,
     None => panic!("crate register-map has no row for this board"),
 };

@@ -17,8 +17,8 @@ pub use crate::count::{Count, Each, Exactly};
 use rows::ROWS;
 pub use rows::*;
 
-/// A board as a type, the same on the device and in tests. What a board lacks is a constant in its row, so the compiler
-/// leaves out the code for it, and a count of 0, so that it takes no RAM.
+/// A board as a type, the same on the device and in tests. What a board lacks is a constant in its row, so that the
+/// compiler leaves out the code for it, and a count of 0, so that its settings and values take no RAM.
 pub trait Board: Copy + fmt::Debug + Eq + 'static {
     /// The board.
     const ROW: &'static Row;

@@ -9,8 +9,8 @@ use register_map::board::{FX3U_24, MODIO_02};
 use crate::workspace::{ALL, SUITE, Workspace};
 use crate::{bench, build, command, fuzz, peers};
 
-/// The parts of the boards, each with the board for which its programs are checked. The two differ in every feature of
-/// firmware and of the HAL. What only a board has are its pins, which are compiled for every board.
+/// The parts of the boards, each with the board for which its programs are checked. The two differ in what
+/// their rows say of switch, second line, events and slots. What only a board has are its pins, which are compiled for every board.
 pub const PARTS: [(&str, &Row); 2] = [("small", &MODIO_02), ("large", &FX3U_24)];
 
 /// The programs for the microcontroller, each with its packages. They need different features of board-support.

@@ -15,7 +15,6 @@ const BUTTON: Pin = Pin::b(8);
 
 /// The eth-io5r.
 pub const BOARD: Descriptor = Descriptor {
-    name: "eth-io5r",
     mapr: 0,
     line: LinePins {
         uart: Usart::Usart2,

@@ -65,10 +65,9 @@ pub(super) const fn outputs(lines: [Pin; 4]) -> SlotPins {
     }
 }
 
-/// Returns the board with this name and these ports.
-pub(super) const fn board(name: &'static str, slots: &'static [SlotPins]) -> Descriptor {
+/// Returns the board with these ports.
+pub(super) const fn board(slots: &'static [SlotPins]) -> Descriptor {
     Descriptor {
-        name,
         // SWJ_CFG = 100: no debug port, because PA14 and PB3 are its pins.
         mapr: 0b100 << 24,
         line: LinePins {

@@ -5,7 +5,6 @@ use crate::pin::Pin;
 
 /// The fx3u-14.
 pub const BOARD: Descriptor = fx3u::board(
-    "fx3u-14",
     &[
         fx3u::X0,
         fx3u::X4,

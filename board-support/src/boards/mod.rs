@@ -30,8 +30,6 @@ include!(concat!(env!("OUT_DIR"), "/board.rs"));
 /// A board.
 #[derive(Clone, Copy, Debug)]
 pub struct Descriptor {
-    /// The board's name, as in its row in crate register-map.
-    pub name: &'static str,
     /// AFIO_MAPR, which is written once: remapped pins, and whether the pins of the debug port are free (RM0008 9.4.2).
     pub mapr: u32,
     /// The RS-485 line.

@@ -8,7 +8,6 @@ use crate::{
 
 /// The modio-02.
 pub const BOARD: Descriptor = Descriptor {
-    name: "modio-02",
     mapr: 0,
     line: LinePins {
         uart: Usart::Usart1,

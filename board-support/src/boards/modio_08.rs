@@ -8,7 +8,6 @@ use crate::{
 
 /// The modio-08.
 pub const BOARD: Descriptor = Descriptor {
-    name: "modio-08",
     mapr: 0,
     line: LinePins {
         uart: Usart::Usart1,

@@ -526,7 +526,7 @@ impl<B: Board> DataModel for Device<B> {
             Block::Pulses => self.points.clear_pulses(span),
             // Of these registers `check_write_words` accepts only UNIT_BY_SERIAL.
             Block::ReadOnly => {
-                if !B::ROW.is_modular()
+                if !B::ROW.switch
                     && let Some(unit) = words.get(0)
                 {
                     self.config.set_unit(unit);

@@ -76,6 +76,24 @@ fn a_save_after_an_invalid_store_needs_the_budget_until_it_is_complete() {
 }
 
 #[test]
+fn after_a_save_that_failed_the_flash_decides_whether_a_save_needs_the_budget() {
+    for (before, after) in [(false, true), (true, false)] {
+        let mut config = Config::new(Settings::defaults(), before);
+        assert_eq!(write(&mut config, KEY, &[OPENING_KEY]), DONE);
+        assert_eq!(write(&mut config, COMMAND, &[1]), Ok(Some(Command::Save)));
+        config.begin_save();
+        config.set_saves_left(0);
+        config.save_failed(Settings::defaults(), after);
+        let wanted = if after {
+            LOCKED
+        } else {
+            Ok(Some(Command::Save))
+        };
+        assert_eq!(write(&mut config, COMMAND, &[1]), wanted);
+    }
+}
+
+#[test]
 fn budget_begins_full_or_with_the_saves_that_were_kept() {
     let mut config = config(&[]);
     assert_eq!(config.saves_left(), 20);
