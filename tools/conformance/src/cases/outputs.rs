@@ -17,8 +17,8 @@ const N: &[Need] = &[Need::Modio, Need::Config, Need::Function(6)];
 #[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
     case("outputs/safe-when-the-line-dies", "map, communication watchdog",
-        "without requests for COMM_TIMEOUT every output goes to SAFE, the flag stays until it is cleared", N,
-        line_dies),
+        "without requests for COMM_TIMEOUT every output goes to SAFE, also when requests to another unit and bad frames \
+        come; the flag stays until it is cleared", N, line_dies),
     case("outputs/stay-while-the-line-lives", "map, communication watchdog",
         "requests and broadcasts within COMM_TIMEOUT keep outputs as they are", N, line_lives),
     case("outputs/stay-while-heartbeats-come", "map, 0x010C",
@@ -123,7 +123,16 @@ fn line_dies(tester: &mut Tester<'_>) -> Check {
         };
         write(tester, function, address, high)?;
         is(tester, high, "the output as written")?;
-        tester.rest(timeout * 2)?;
+        let other = tester.other();
+        let mut bad = tester.ping();
+        // In RTU a byte of the address, in ASCII a digit of the function.
+        bad[3] ^= 1;
+        let end = tester.endpoint.now() + timeout * 2;
+        while tester.endpoint.now() < end {
+            tester.rest(timeout / 4)?;
+            tester.silent_ping(other, "a request to another unit")?;
+            tester.silence_to(&bad, "a wrong checksum")?;
+        }
         is(tester, 0, "the output at SAFE, 0")?;
         let tripped = has_tripped(tester)?;
         tester.ensure(tripped, "status bit 0 set: the watchdog has tripped")?;

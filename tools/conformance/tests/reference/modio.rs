@@ -101,6 +101,14 @@ impl Modio {
         }
     }
 
+    /// Notes at this instant a frame that is not for this unit: with this fault it counts as a request.
+    pub fn other_frame(&mut self, at: Duration, fault: ModioFault) {
+        if self.has(fault) {
+            self.modio.watch(at);
+            self.modio.note_request();
+        }
+    }
+
     /// Handles a request with a function code of 80 or above.
     pub fn odd_request(&mut self) {
         if self.has(ModioFault::RestartsByOddFrames) {

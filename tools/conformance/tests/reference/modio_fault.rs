@@ -36,6 +36,10 @@ faults! {
     SafeOneByOne => ["hurts/torn-values"],
     /// Has no communication watchdog.
     WatchdogSleeps => ["outputs/safe-when-the-line-dies"],
+    /// Restarts the communication timeout at a request to another unit.
+    OtherUnitsAreLife => ["outputs/safe-when-the-line-dies"],
+    /// Restarts the communication timeout at a frame with a wrong checksum.
+    BadFramesAreLife => ["outputs/safe-when-the-line-dies"],
     /// Does not restart the communication timeout at a broadcast.
     BroadcastsAreNoLife => ["outputs/stay-while-the-line-lives"],
     /// Does not restart the communication timeout at a write of HEARTBEAT.

@@ -329,6 +329,9 @@ impl Unit {
 
     fn message(&mut self, body: Vec<u8>, good: bool, at: Duration) {
         if !good || body.len() < 2 {
+            if let Some(modio) = &mut self.server.modio {
+                modio.other_frame(at, ModioFault::BadFramesAreLife);
+            }
             self.spoilt();
             self.deaf |= self.server.has(Fault::DeafAfterBadFrames);
             if self.server.has(Fault::AnswersNoise) && body.first() == Some(&self.address) {
@@ -353,6 +356,9 @@ impl Unit {
             return;
         }
         if !mine {
+            if let Some(modio) = &mut self.server.modio {
+                modio.other_frame(at, ModioFault::OtherUnitsAreLife);
+            }
             if self.server.has(Fault::LogsOthers) {
                 self.reference.log.push(0x80);
             }
