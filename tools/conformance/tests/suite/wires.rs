@@ -2,6 +2,7 @@
 //! reason. All outputs are restored.
 
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use conformance::cases::of_bench;
 use conformance::endpoint::exact_line::{ExactLine, Transport};
@@ -12,17 +13,31 @@ use conformance::run::{Outcome, Verdict, run_until};
 use conformance::tester::Tester;
 use modbus_line::exact::{Reply, Request};
 use register_map::{Module, configuration};
-use sim::Channel;
+use sim::{Channel, Time};
 
 use super::{modio_02, probed};
 
 /// A wire between two channels: board and channel of the output, those of the input, and the input as a part of the output.
 type Wire = ([usize; 2], [usize; 2], f64);
 
+/// What the first wire, a digital one, does wrong.
+#[derive(Clone, Copy, Debug)]
+enum Fault {
+    /// It is interrupted for 8 ms, 8 ms after each rise. A FILTER of 5 ms does not remove this.
+    Bounces,
+    /// It does not carry the pulse that begins with this rise; the first rise is 1.
+    Drops(usize),
+}
+
 /// Boards on one line. The first one is unit 1, the next one unit 2.
 struct Boards {
     boards: Vec<InProcess>,
     wires: Vec<Wire>,
+    fault: Option<Fault>,
+    /// Whether the output of the first wire is on, how often it has been switched on, and when the last time.
+    on: bool,
+    rises: usize,
+    last_rise: Time,
 }
 
 impl Boards {
@@ -33,30 +48,59 @@ impl Boards {
         Self {
             boards: boards.collect(),
             wires: wires.to_vec(),
+            fault: None,
+            on: false,
+            rises: 0,
+            last_rise: Time::ZERO,
+        }
+    }
+
+    /// The same boards, with this fault of the first wire.
+    fn with(mut self, fault: Fault) -> Self {
+        self.fault = Some(fault);
+        self
+    }
+
+    /// Returns what the first wire carries while its output is on, or off.
+    fn first_carries(&mut self, on: bool) -> bool {
+        let now = self.boards[0].board.now();
+        if on && !self.on {
+            self.rises += 1;
+            self.last_rise = now;
+        }
+        self.on = on;
+        let interrupted = self.last_rise + Time::from_ms(8)..self.last_rise + Time::from_ms(16);
+        match self.fault {
+            Some(Fault::Bounces) => on && !interrupted.contains(&now),
+            Some(Fault::Drops(rise)) => on && self.rises != rise,
+            None => on,
         }
     }
 
     /// Sets inputs to the values of their outputs.
     fn carry(&mut self) {
-        for ([from, output], [to, input], gain) in &self.wires {
-            let output = self.boards[*from].board.channel(*output);
-            let to = &mut self.boards[*to].board;
+        for n in 0..self.wires.len() {
+            let ([from, output], [to, input], gain) = self.wires[n];
+            let mut output = self.boards[from].board.channel(output);
+            if let (0, Channel::Do { on }) = (n, &mut output) {
+                *on = self.first_carries(*on);
+            }
+            let to = &mut self.boards[to].board;
             let set = match output {
-                Channel::Do { on } => to.set_energised(*input, on),
+                Channel::Do { on } => to.set_energised(input, on),
                 Channel::Ao { code } => {
                     // 3300 mV at the pin of an input give code 4095.
                     let millivolts = f64::from(code) / 4095.0 * 3300.0 * gain;
-                    to.set_millivolts(*input, millivolts.round() as u16)
+                    to.set_millivolts(input, millivolts.round() as u16)
                 }
                 other => panic!("{other:?} is no output"),
             };
             set.expect("there is such an input");
         }
     }
-}
 
-impl Transport for Boards {
-    fn ask(&mut self, request: &Request) -> Result<Reply, String> {
+    /// Sends a request to all boards.
+    fn ask_all(&mut self, request: &Request) -> Result<Reply, String> {
         let mut replies = self.boards.iter_mut().map(|board| board.ask(request));
         let mut reply = replies.next().expect("a board")?;
         for other in replies {
@@ -67,6 +111,28 @@ impl Transport for Boards {
         }
         self.carry();
         Ok(reply)
+    }
+}
+
+impl Transport for Boards {
+    fn ask(&mut self, request: &Request) -> Result<Reply, String> {
+        let &Request::Run(mut left) = request else {
+            return self.ask_all(request);
+        };
+        // The wires carry each millisecond.
+        let mut all = Vec::new();
+        loop {
+            let step = left.min(Duration::from_millis(1));
+            let reply = self.ask_all(&Request::Run(step))?;
+            let Reply::Events(now, events) = reply else {
+                return Ok(reply);
+            };
+            all.extend(events);
+            left -= step;
+            if left.is_zero() {
+                return Ok(Reply::Events(now, all));
+            }
+        }
     }
 }
 
@@ -182,6 +248,26 @@ fn wires_and_pulses_between_two_boards_pass_and_a_missing_or_crossed_wire_fails(
     let off = ["wires/", "unit 2 point 0x0010 stays off"];
     let second = ["wires/unit 1 point 0x0011", ""];
     assert_wires(digital(&[FIRST, SECOND]), &inverted, &[off, second]);
+}
+
+/// The wire carries the level each time that it is asked for, so only the count shows it.
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn wire_that_bounces_passes_but_its_pulses_are_counted_twice() {
+    let second = ["wires/unit 1 point 0x0011", ""];
+    let twice = ["pulses/", "counted 10; 5 pulses counted"];
+    let boards = digital(&[FIRST, SECOND]).with(Fault::Bounces);
+    assert_wires(boards, WIRES, &[["wires/", ""], second, twice]);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn pulse_that_a_wire_does_not_carry_fails() {
+    let second = ["wires/unit 1 point 0x0011", ""];
+    let missing = ["pulses/", "unit 2 point 0x0010 stays off; on within 100ms"];
+    // The output is on at the start, in the test of the wire, and when it is restored. The third pulse is missing.
+    let boards = digital(&[FIRST, SECOND]).with(Fault::Drops(6));
+    assert_wires(boards, WIRES, &[["wires/", ""], second, missing]);
 }
 
 #[test]
