@@ -8,7 +8,7 @@ use clap::Parser;
 use modbus_line::{Format, LineFormat};
 use register_map::Module;
 
-use crate::case::{Case, Kind};
+use crate::case::{Case, Kind, Need};
 use crate::cases;
 use crate::endpoint::Endpoint;
 use crate::endpoint::exact_line;
@@ -174,17 +174,41 @@ impl Cli {
         }
         let hil = self.of_bench();
         ensure!(
-            !self.on_bench.no_suite || hil.requests > 0 || !hil.wires.is_empty(),
-            "nothing to test: no suite, no requests, and no wires in a bench file"
+            hil.requests > 0 || hil.rates.is_empty() && hil.limit.is_none(),
+            "--rates and --limit need requests: --requests N"
         );
+        self.can_test(&hil)?;
         Ok(self)
     }
 
-    fn names_endpoint(&self) -> bool {
-        let named = self.serial.is_some() || self.tcp.is_some() || self.exact_line.is_some();
+    /// Checks that the bench has what one at least of the cases needs, if some of them need a bench.
+    fn can_test(&self, hil: &Hil) -> Result<()> {
+        let mut reasons = Vec::new();
+        for case in self.cases()? {
+            let why = case.needs.iter().find_map(|need| hil.lacks(*need));
+            // Where time is not exact, the other cases of the group `timing` cannot run.
+            if why.is_none() && (self.is_exact() || !case.needs.contains(&Need::Exact)) {
+                return Ok(());
+            }
+            reasons.extend(why);
+        }
+        ensure!(
+            reasons.is_empty(),
+            "nothing to test: {}",
+            reasons.join("; ")
+        );
+        Ok(())
+    }
+
+    fn is_exact(&self) -> bool {
+        let exact = self.exact_line.is_some();
         #[cfg(feature = "sim")]
-        let named = named || self.sim.is_some();
-        named
+        let exact = exact || self.sim.is_some();
+        exact
+    }
+
+    fn names_endpoint(&self) -> bool {
+        self.serial.is_some() || self.tcp.is_some() || self.is_exact()
     }
 
     /// Returns what a bench adds to the cases.

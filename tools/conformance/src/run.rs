@@ -11,7 +11,6 @@ use serde_json::Value;
 use crate::case::{Case, Failure, Need, Part, Run, Stop};
 use crate::endpoint::{Broken, Endpoint};
 use crate::frame::Mode;
-use crate::hil::bench_file::Wire;
 use crate::points::pdu;
 use crate::target::{Support, Target};
 use crate::tester::Tester;
@@ -179,7 +178,6 @@ fn one(mut tester: Tester<'_>, case: &Case, done: &mut dyn FnMut(Outcome)) -> Re
 /// Returns the reason why a need is not met, if it is not met.
 fn lacking(need: Need, endpoint: &dyn Endpoint, target: &Target) -> Option<String> {
     let able = endpoint.abilities();
-    let mut wires = target.hil.wires.iter();
     let (met, why) = match need {
         Need::Function(function) => {
             let how = match target.functions.get(&function) {
@@ -230,19 +228,9 @@ fn lacking(need: Need, endpoint: &dyn Endpoint, target: &Target) -> Option<Strin
         Need::Modio => (target.modio.is_some(), "about the modio only"),
         Need::Rtu => (target.mode == Mode::Rtu, "about RTU framing"),
         Need::Ascii => (target.mode == Mode::Ascii, "about ASCII framing: --ascii"),
-        Need::Requests => (target.hil.requests > 0, "measures with --requests only"),
-        Need::Wires => (
-            wires.any(Wire::is_digital),
-            "no [[wire]] in a bench file: --bench",
-        ),
-        Need::Pulses => (
-            wires.any(Wire::has_pulses),
-            "no [[wire]] with pulses in a bench file: --bench",
-        ),
-        Need::AnalogWires => (
-            wires.any(|wire| !wire.is_digital()),
-            "no [[analog]] in a bench file: --bench",
-        ),
+        Need::Requests | Need::Wires | Need::Pulses | Need::AnalogWires => {
+            return target.hil.lacks(need).map(str::to_owned);
+        }
     };
     (!met).then(|| why.to_owned())
 }

@@ -98,10 +98,54 @@ fn mistake_in_a_bench_file_is_one_line_that_names_the_file_and_the_line() {
     let named = error.contains("bench.toml:2: unknown field `prot`");
     assert!(named && !error.contains('\n'), "{error}");
     let error = with_file(FILE, "--no-suite --requests 0").unwrap_err();
-    assert!(error.starts_with("nothing to test"), "{error}");
+    assert!(error.starts_with("nothing to test: "), "{error}");
     let missing = parse("--bench /nowhere/b.toml").with_bench_file();
     let error = format!("{:#}", missing.unwrap_err());
     assert!(error.starts_with("/nowhere/b.toml: "), "{error}");
+}
+
+const WIRE: &str = "[[wire]]\nfrom = { point = 0x10 }\nto = { unit = 2, point = 0x10 }\n";
+
+#[test]
+fn cases_that_all_lack_something_of_the_bench_are_an_error_that_says_what() {
+    for (file, arguments, reason) in [
+        (
+            WIRE,
+            "--only pulses --requests 0",
+            "no [[wire]] with pulses",
+        ),
+        ("", "--only wires", "no [[wire]] in a bench file: --bench"),
+        (
+            "",
+            "--only timing --requests 0",
+            "measures with --requests only",
+        ),
+        (
+            "",
+            "--only timing --rates all --requests 0",
+            "need requests: --requests N",
+        ),
+        ("", "--limit 9 --requests 0", "need requests: --requests N"),
+    ] {
+        let error = with_file(file, arguments).unwrap_err();
+        let right = error.contains(reason) && !error.contains('\n');
+        assert!(right, "{arguments}: {error}");
+    }
+    for arguments in [
+        "--only wires",
+        "--only wires --only pulses",
+        "--only timing",
+    ] {
+        with_file(WIRE, arguments).unwrap();
+    }
+    let exact = "--exact-line b:1 --only timing --requests 0";
+    with_file("", exact).unwrap();
+    let without_hil = |arguments: &str| parse(arguments).with_bench_file().err();
+    for ignored in ["--rates 9600", "--limit 9"] {
+        let error = without_hil(ignored).unwrap().to_string();
+        assert!(error.contains("--requests N"), "{error}");
+        assert!(without_hil(&format!("{ignored} --requests 5")).is_none());
+    }
 }
 
 #[test]
