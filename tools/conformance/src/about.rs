@@ -8,7 +8,8 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use serialport::{SerialPortInfo, SerialPortType};
 
-use crate::case::Check;
+use crate::case::Stop;
+use crate::endpoint::Broken;
 use crate::target::{Modio, Span};
 use crate::tester::Tester;
 
@@ -46,16 +47,16 @@ struct Adapter {
     serial_number: Option<String>,
 }
 
-/// The unit, read from its registers.
+/// The unit, read from its registers. `None` is what it has not told.
 #[derive(Clone, Debug, Serialize)]
 pub struct Unit {
     address: u8,
     /// Version of its firmware.
-    firmware: String,
+    firmware: Option<String>,
     /// First 32 bits of the commit that its image was built from; `None` when its register map has no commit.
     commit: Option<String>,
     /// Its unique identity, in hexadecimal.
-    identity: String,
+    identity: Option<String>,
     /// The modules in force in its slots.
     module: String,
 }
@@ -102,27 +103,26 @@ fn add(name: &str, value: &Value, all: &mut Vec<(String, String)>) {
 }
 
 impl Unit {
-    /// Reads the registers of the unit, a modio with these modules.
-    pub fn ask(tester: &mut Tester<'_>, modules: Modio) -> Check<Self> {
-        let mut read = |first, count| tester.read_words(Span::of(first, count));
+    /// Reads the registers of the unit, a modio with these modules. A wrong reply is for the cases to find.
+    pub fn ask(tester: &mut Tester<'_>, modules: Modio) -> Result<Self, Broken> {
+        let mut read = |first, count| match tester.read_words(Span::of(first, count)) {
+            Ok(words) => Ok(Some(words)),
+            Err(Stop::Broken(broken)) => Err(broken),
+            Err(Stop::Fail(_) | Stop::Skip(_)) => Ok(None),
+        };
         let version = read(state::FIRMWARE_VERSION, 3)?;
-        let [firmware, patch, map] = version[..] else {
-            unreachable!("three registers were read");
-        };
-        let (commit, build) = if map < MAP_WITH_COMMIT {
-            (None, 0)
-        } else {
-            let words = read(COMMIT, 3)?;
-            let dirty = if words[2] & 1 == 0 { "" } else { "-dirty" };
-            let commit = format!("{:04x}{:04x}{dirty}", words[0], words[1]);
-            (Some(commit), words[2])
-        };
+        let has_commit = version.as_ref().is_some_and(|v| v[2] >= MAP_WITH_COMMIT);
+        let commit = if has_commit { read(COMMIT, 3)? } else { None };
+        let build = commit.as_ref().map_or(0, |words| words[2]);
         let identity = read(state::UNIQUE_ID, 6)?;
         Ok(Self {
             address: tester.unit(),
-            firmware: state::version([firmware, patch], build).to_string(),
-            commit,
-            identity: identity.iter().map(|word| format!("{word:04X}")).collect(),
+            firmware: version.map(|v| state::version([v[0], v[1]], build).to_string()),
+            commit: commit.map(|words| {
+                let dirty = if words[2] & 1 == 0 { "" } else { "-dirty" };
+                format!("{:04x}{:04x}{dirty}", words[0], words[1])
+            }),
+            identity: identity.map(|words| words.iter().map(|w| format!("{w:04X}")).collect()),
             module: modules.to_string(),
         })
     }
@@ -190,9 +190,9 @@ mod tests {
         assert!(about.date.ends_with('Z') && !about.host.is_empty());
         about.unit = Some(Unit {
             address: 7,
-            firmware: "1.2.3".to_owned(),
+            firmware: Some("1.2.3".to_owned()),
             commit: None,
-            identity: "00AA".to_owned(),
+            identity: Some("00AA".to_owned()),
             module: "4do".to_owned(),
         });
         let json = json!(about);

@@ -9,6 +9,7 @@ use anyhow::{anyhow, ensure};
 use clap::{CommandFactory as _, FromArgMatches as _};
 
 use conformance::about::{About, Unit};
+use conformance::case::Case;
 use conformance::cases::each_rate;
 use conformance::cli::Cli;
 use conformance::endpoint::trace::Trace;
@@ -62,9 +63,31 @@ fn test(cli: Cli) -> anyhow::Result<u8> {
     }
     let cli = cli.with_bench_file()?;
     cli.reports.check()?;
+    let mut report = Report {
+        about: About::here(cli.serial.as_deref(), register_map::commit!()),
+        ..Report::default()
+    };
+    let ended = run(&cli, &cases, &mut report);
+    // The results up to an error are reported, too, so that no report of an earlier run stays.
+    let written = cli
+        .reports
+        .write(&junit::document(&report), &json::value(&report));
+    let is_modio = ended?;
+    written?;
+    if report.interrupted {
+        return Ok(interrupt::STATUS);
+    }
+    // The documents of the modio promise what the interpretations demand.
+    let strict = cli.strict || is_modio;
+    Ok(u8::from(Totals::of(&report.outcomes).counted(strict) > 0))
+}
+
+/// Runs these cases, and adds to the report what is known. Returns whether the unit is a modio.
+fn run(cli: &Cli, cases: &[Case], report: &mut Report) -> anyhow::Result<bool> {
     let profile = cli.read_profile()?;
     let mode = cli.mode(profile.as_ref());
     let mut endpoint = cli.open(mode)?;
+    report.endpoint = endpoint.name();
     // Wrong arguments have been reported by now, before anything is done to the board.
     cli.on_bench.prepare()?;
     if let Some(file) = &cli.on_bench.update {
@@ -83,14 +106,9 @@ fn test(cli: Cli) -> anyhow::Result<u8> {
         profile: profile.as_ref(),
         allow_config: cli.allow_config,
     };
-    let mut report = Report {
-        about: About::here(cli.serial.as_deref(), register_map::commit!()),
-        endpoint: endpoint.name(),
-        ..Report::default()
-    };
     let mut target = probe(endpoint.as_mut(), &given)?;
     target.hil = cli.of_bench();
-    is_wanted(&cli, &target)?;
+    is_wanted(cli, &target)?;
     let mut tester = Tester::new(endpoint.as_mut(), &target);
     let unit = target.modio.map(|modio| Unit::ask(&mut tester, modio));
     report.about.unit = unit.transpose()?;
@@ -109,30 +127,20 @@ fn test(cli: Cli) -> anyhow::Result<u8> {
     let ended = run_until(
         endpoint.as_mut(),
         &target,
-        &cases,
+        cases,
         stop,
         |outcome| say(table::row(outcome)),
         &mut report.outcomes,
     );
     report.interrupted = stop.load(Ordering::Relaxed);
-    // The results up to an error are reported, too.
     say(table::summary(&report.outcomes));
     for outcome in &report.outcomes {
         if matches!(outcome.verdict, Verdict::Failed(_)) {
             say(format_args!("failed: {}", outcome.name));
         }
     }
-    let written = cli
-        .reports
-        .write(&junit::document(&report), &json::value(&report));
     ended?;
-    written?;
-    if report.interrupted {
-        return Ok(interrupt::STATUS);
-    }
-    // The documents of the modio promise what the interpretations demand.
-    let strict = cli.strict || target.modio.is_some();
-    Ok(u8::from(Totals::of(&report.outcomes).counted(strict) > 0))
+    Ok(target.modio.is_some())
 }
 
 /// Checks that the unit is a modio with the module that the user expects, if the user does.

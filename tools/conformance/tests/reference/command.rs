@@ -8,11 +8,18 @@ use std::process::{Command, Output};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use conformance::about::Unit as About;
 use conformance::frame::Mode;
+use conformance::points::pdu;
+use conformance::tester::Tester;
 use modbus_line::LineFormat;
+use register_map::state;
 use tempfile::TempDir;
 
+use super::endpoint::Reference;
 use super::fault::Fault;
+use super::modio::UNIT;
+use super::probed;
 use super::unit::{Character, Unit};
 
 const PROFILE: &str = r#"
@@ -187,6 +194,56 @@ fn run_that_cannot_test_gives_status_2_and_one_line() {
 }
 
 #[test]
+fn run_that_ends_before_its_first_case_leaves_no_reports_of_an_earlier_run() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let at = |name: &str| directory.path().join(name);
+    let (json, junit) = (at("result.json"), at("junit.xml"));
+    fs::write(&json, "old").expect("written");
+    fs::write(&junit, "old").expect("written");
+    let (json_shown, junit_shown) = (json.display(), junit.display());
+    let silent = server(None);
+    let output = command(&format!(
+        "--tcp {silent} --unit 77 --patience 50 --json {json_shown} --junit {junit_shown}"
+    ));
+    assert_eq!(output.status.code(), Some(2));
+    let json = fs::read_to_string(json).expect("there");
+    let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+    assert_eq!(json["cases"], serde_json::json!([]));
+    let junit = fs::read_to_string(junit).expect("there");
+    assert!(junit.contains("tests=\"0\""), "{junit}");
+}
+
+#[test]
+fn unit_that_does_not_tell_its_identity_or_version_is_described_without_them() {
+    let line = LineFormat::default();
+    let described = |hidden: Option<Vec<u8>>| {
+        let mut endpoint = Reference::modio(None, Mode::Rtu, line);
+        let target = probed(&mut endpoint, Mode::Rtu, None);
+        endpoint.way = Box::new(move |bytes, _| match &hidden {
+            Some(frame) if bytes == frame => Vec::new(),
+            _ => bytes.to_vec(),
+        });
+        let mut tester = Tester::new(&mut endpoint, &target);
+        let modio = target.modio.expect("a modio");
+        let unit = About::ask(&mut tester, modio).expect("the line works");
+        serde_json::to_value(unit).expect("JSON")
+    };
+    let all = described(None);
+    for (register, count, keys) in [
+        (state::UNIQUE_ID, 6, &["identity"][..]),
+        (state::FIRMWARE_VERSION, 3, &["firmware", "commit"]),
+    ] {
+        let mut wanted = all.clone();
+        for key in keys {
+            assert!(wanted[key].is_string(), "{wanted}");
+            wanted[key] = serde_json::Value::Null;
+        }
+        let request = Mode::Rtu.frame(UNIT, &pdu(3, register, count));
+        assert_eq!(described(Some(request)), wanted);
+    }
+}
+
+#[test]
 fn failed_interpretation_gives_status_1_only_with_strict() {
     for (arguments, status) in [
         ("--only fc05/length", 0),
@@ -279,7 +336,7 @@ fn report_of_a_bench_has_the_unit_and_what_was_measured() {
 fn unit_with_another_module_than_the_bench_is_not_tested() {
     let (status, report, text) = hil("module = '4ao'", "");
     assert_eq!(status, Some(2), "{text}");
-    assert!(report.is_null(), "{report}");
+    assert_eq!(report["cases"].as_array().map(Vec::len), Some(0));
     let error = "unit 1 has the module 2relay in force, but the bench has 4ao";
     assert!(text.contains(error), "{text}");
 }
