@@ -42,13 +42,13 @@ pub struct Cli {
 
     /// Test through the exact-line protocol, in virtual time: the simulator's --exact-line, Renode's
     /// exact-line.py
-    #[arg(long, value_name = "HOST:PORT", group = "endpoint", conflicts_with_all = ["baud", "format"])]
+    #[arg(long, value_name = "HOST:PORT", group = "endpoint", conflicts_with_all = ["baud", "format", "flash", "reset_cmd", "update", "power_cmd"])]
     pub exact_line: Option<String>,
 
     /// Test the firmware in the simulator, in exact virtual time: the loader with the image of --image, or without it an
     /// image that runs alone
     #[cfg(feature = "sim")]
-    #[arg(long, value_name = "ELF", group = "endpoint")]
+    #[arg(long, value_name = "ELF", group = "endpoint", conflicts_with_all = ["flash", "reset_cmd", "update", "power_cmd"])]
     pub sim: Option<PathBuf>,
 
     /// The image that the loader of --sim starts: the file of an update (.modio), or of one slot (.image)
@@ -166,10 +166,13 @@ impl Cli {
             self.baud = self.baud.or(file.baud);
             self.format = self.format.or(file.format);
             self.module = self.module.or(file.module);
+            // The commands are for a real board.
+            let is_real = !self.is_exact();
+            let command = |of_file: Option<String>| of_file.filter(|_| is_real);
             let bench = &mut self.on_bench;
             bench.probe = bench.probe.take().or(file.probe);
-            bench.reset_cmd = bench.reset_cmd.take().or(file.reset_cmd);
-            bench.power_cmd = bench.power_cmd.take().or(file.power_cmd);
+            bench.reset_cmd = bench.reset_cmd.take().or(command(file.reset_cmd));
+            bench.power_cmd = bench.power_cmd.take().or(command(file.power_cmd));
             bench.wires = file.wires;
         }
         let hil = self.of_bench();

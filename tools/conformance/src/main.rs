@@ -88,12 +88,15 @@ fn run(cli: &Cli, cases: &[Case], report: &mut Report) -> anyhow::Result<bool> {
     let mode = cli.mode(profile.as_ref());
     let mut endpoint = cli.open(mode)?;
     report.endpoint = endpoint.name();
+    let update = cli.on_bench.update.as_ref();
+    let update = update.map(|file| anyhow::Ok((cli.reached()?, file)));
+    let update = update.transpose()?;
     // Wrong arguments have been reported by now, before anything is done to the board.
     cli.on_bench.prepare()?;
-    if let Some(file) = &cli.on_bench.update {
+    if let Some((reached, file)) = update {
         // The other program needs the port.
         drop(endpoint);
-        shell::update(&cli.reached()?, file)?;
+        shell::update(&reached, file)?;
         endpoint = cli.open(mode)?;
     }
     if cli.trace {

@@ -23,6 +23,18 @@ fn the_options_are_consistent() {
         "--module 5do",
         "--probe b",
         "--elf c",
+        "--exact-line a --flash",
+        "--exact-line a --reset-cmd b",
+        "--exact-line a --update b",
+        "--exact-line a --power-cmd b",
+        #[cfg(feature = "sim")]
+        "--sim a --flash",
+        #[cfg(feature = "sim")]
+        "--sim a --reset-cmd b",
+        #[cfg(feature = "sim")]
+        "--sim a --update b",
+        #[cfg(feature = "sim")]
+        "--sim a --power-cmd b",
     ] {
         let arguments = ["x"].into_iter().chain(wrong.split(' '));
         assert!(Cli::try_parse_from(arguments).is_err(), "{wrong}");
@@ -80,6 +92,8 @@ fn option_takes_precedence_over_the_bench_file() {
     assert_eq!(shown(&cli), "/dev/b 3:4 s q 9600 8N1 9 4di");
     assert_eq!(with_file(FILE, "--tcp b:1").unwrap().serial, None);
     assert_eq!(parse("--port a").of_bench().requests, 0);
+    let exact = with_file(FILE, "--exact-line b:1").unwrap().on_bench;
+    assert_eq!((exact.reset_cmd, exact.power_cmd), (None, None));
 }
 
 #[test]
