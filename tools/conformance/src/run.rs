@@ -99,6 +99,7 @@ pub fn run_until(
         report(&outcome);
         outcomes.push(outcome);
     };
+    let mut edits = false;
     for case in cases {
         if stop.load(Ordering::Relaxed) {
             break;
@@ -110,13 +111,15 @@ pub fn run_until(
         match lacking {
             Some(why) => done(Outcome::of(*case, Verdict::Skipped(why), Duration::ZERO, 0)),
             None => {
+                let mut needs = case.needs.iter();
+                edits |= needs.any(|need| matches!(need, Need::Config | Need::Words));
                 let mut tester = Tester::new(endpoint, target);
                 tester.stop = stop;
                 one(tester, case, &mut done)?;
             }
         }
     }
-    if target.allow_config && target.modio.is_some() {
+    if edits && target.allow_config && target.modio.is_some() {
         // Settings that cases have changed and restored still count as unsaved changes. Drop these changes.
         let mut tester = Tester::new(endpoint, target);
         if tester.unlock().is_ok() {

@@ -29,6 +29,7 @@ use endpoint::Reference;
 use fault::{FAULTS, Fault};
 use modbus_line::LineFormat;
 use modio_fault::{MODIO_FAULTS, ModioFault};
+use register_map::configuration;
 
 const PROFILE: &str = r#"
 unit = 9
@@ -246,6 +247,27 @@ fn every_case_has_a_fault_that_makes_it_fail() {
         .filter(|name| !proven.contains(name))
         .collect();
     assert!(unproven.is_empty(), "cases without a fault: {unproven:?}");
+}
+
+#[test]
+fn unsaved_settings_are_dropped_only_after_a_case_that_may_write_settings() {
+    let mut endpoint = Reference::modio(None, Mode::Rtu, LineFormat::default());
+    let target = probed(&mut endpoint, Mode::Rtu, None);
+    let safe = configuration::SAFE + 0x12;
+    for (name, wanted) in [("fc02/same-as-01", 1), ("config/all-or-nothing", 0)] {
+        let mut tester = Tester::new(&mut endpoint, &target);
+        tester.unlock().unwrap();
+        tester.set_words(safe, &[1]).unwrap();
+        let mut case = all();
+        case.retain(|case| case.name == name);
+        let verdict = run(&mut endpoint, &target, &case)
+            .unwrap()
+            .remove(0)
+            .verdict;
+        assert_eq!(verdict, Verdict::Passed);
+        let mut tester = Tester::new(&mut endpoint, &target);
+        assert_eq!(tester.read_word(safe), Ok(wanted), "after {name}");
+    }
 }
 
 #[test]
