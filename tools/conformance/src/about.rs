@@ -47,7 +47,7 @@ struct Adapter {
     serial_number: Option<String>,
 }
 
-/// The unit, read from its registers. `None` is what it has not told.
+/// The unit, read from its registers. `None` where its reply is wrong.
 #[derive(Clone, Debug, Serialize)]
 pub struct Unit {
     address: u8,

@@ -214,7 +214,7 @@ fn run_that_ends_before_its_first_case_leaves_no_reports_of_an_earlier_run() {
 }
 
 #[test]
-fn unit_that_does_not_tell_its_identity_or_version_is_described_without_them() {
+fn unit_that_is_silent_to_identity_or_version_is_described_without_them() {
     let line = LineFormat::default();
     let described = |hidden: Option<Vec<u8>>| {
         let mut endpoint = Reference::modio(None, Mode::Rtu, line);
