@@ -57,8 +57,8 @@ fn memories_and_clocks_are_those_of_the_part() {
 
 #[test]
 fn pins_are_those_of_the_board() {
-    for board in [&modio_02::BOARD, &modio_08::BOARD] {
-        let file = format!("{}.repl", board.name);
+    for (board, row) in [&modio_02::BOARD, &modio_08::BOARD].into_iter().zip(MODIO) {
+        let file = format!("{row}.repl");
         let text = text("modio.repl") + &text(&file);
         let mut pins = COMMON
             .map(|(name, port, pin)| (name.to_owned(), port, pin))
