@@ -73,10 +73,10 @@ mod app {
         scan_timer: ScanTimer,
         upkeep: Upkeep,
         serving: Serving,
-        scanning: &'static mut Scanning,
+        scanning: Scanning,
         has_second: bool,
         events: Producer<'static, Event>,
-        background_work: &'static mut Background,
+        background_work: Background,
         logged: Consumer<'static, Event>,
         watchdog: Watchdog,
     }
@@ -86,15 +86,11 @@ mod app {
         // No master sends a request while its last one is being served, and the air is half duplex.
         second_adus: [Adu; 1] = [const { Adu::new() }; 1],
         device: MaybeUninit<Device> = MaybeUninit::uninit(),
-        scanning_place: MaybeUninit<Scanning> = MaybeUninit::uninit(),
-        background_place: MaybeUninit<Background> = MaybeUninit::uninit(),
         queue: Queue<Event, 8> = Queue::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
         let memory = start::Memory {
             device: cx.local.device,
-            scanning: cx.local.scanning_place,
-            background: cx.local.background_place,
             adus: cx.local.adus,
             second_adus: cx.local.second_adus,
         };

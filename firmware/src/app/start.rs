@@ -49,19 +49,16 @@ pub struct Started {
     pub second_uart: Option<SecondUart>,
     pub serving: Serving,
     pub device: &'static mut Device,
-    pub scanning: &'static mut Scanning,
+    pub scanning: Scanning,
     pub dacs: [DacLink; SLOTS],
-    pub background: &'static mut Background,
+    pub background: Background,
     pub scan_timer: ScanTimer,
     pub watchdog: Watchdog,
 }
 
-/// The memory for what is built in place, because it is too large to be moved over the stack, and for what is shared with
-/// interrupts.
+/// The memory for what is too large to be moved over the stack, or is shared with interrupts.
 pub struct Memory {
     pub device: &'static mut MaybeUninit<Device>,
-    pub scanning: &'static mut MaybeUninit<Scanning>,
-    pub background: &'static mut MaybeUninit<Background>,
     pub adus: &'static mut [Adu],
     pub second_adus: &'static mut [Adu],
 }
@@ -73,8 +70,6 @@ pub fn up(
     scb: &SCB,
     Memory {
         device: place,
-        scanning,
-        background,
         adus,
         second_adus,
     }: Memory,
@@ -134,13 +129,7 @@ pub fn up(
         port.set_pulses(kept::pulses(slot));
     }
     let mut dacs = [DacLink::default(); SLOTS];
-    let scanning = scanning.write(Scanning::new(
-        modules,
-        sampler,
-        device,
-        &mut dacs,
-        board.powered_s,
-    ));
+    let scanning = Scanning::new(modules, sampler, device, &mut dacs, board.powered_s);
 
     log.start(&log::Start {
         address,
@@ -191,7 +180,7 @@ pub fn up(
         device,
         scanning,
         dacs,
-        background: background.write(Background {
+        background: Background {
             analog_outputs,
             persistence: Persistence::new(store, pages, erase),
             updating,
@@ -203,7 +192,7 @@ pub fn up(
             log,
             stack: LowWater::default(),
             radio: None,
-        }),
+        },
         scan_timer: board.scan_timer,
         watchdog: board.watchdog,
     }
