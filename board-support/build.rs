@@ -43,7 +43,7 @@ fn main() {
     fs::write(out.join("board.rs"), selected).expect("OUT_DIR is writable");
     if is_target {
         println!("cargo::metadata=BOARD={board}");
-        let handlers = || HANDLERS.into_iter().zip(board.memory().interrupts);
+        let handlers = || HANDLERS.into_iter().zip(board.memory.interrupts);
         let mut script = memory(board);
         if !is_on("loader") {
             script.extend(handlers().map(|(handler, name)| format!("{name} = {handler};\n")));
@@ -71,7 +71,7 @@ fn is_on(feature: &str) -> bool {
 
 /// Returns the linker script of an image for a board.
 fn memory(board: &Row) -> String {
-    let (memory, layout) = (board.memory(), board.layout());
+    let (memory, layout) = (board.memory, board.layout());
     // The application alone must fit every part that the board can have.
     let (part, ram) = (memory.part, memory.least().ram);
     let stack = if is_on("loader") {

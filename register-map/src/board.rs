@@ -110,12 +110,6 @@ impl Row {
         names
     };
 
-    /// Returns the memory of the board.
-    #[must_use]
-    pub const fn memory(&self) -> &Memory {
-        &self.memory
-    }
-
     /// Returns the flash pages that store the configuration, while the application runs without a loader.
     #[must_use]
     pub const fn store(&self) -> TwoPages {
@@ -126,7 +120,7 @@ impl Row {
     /// Returns where loader, images, boot state and configuration are in the flash of the board's part.
     #[must_use]
     pub const fn layout(&self) -> Layout {
-        Layout::of(&self.memory().part)
+        Layout::of(&self.memory.part)
     }
 
     /// Returns the board with this code in register BOARD.

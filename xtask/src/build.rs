@@ -137,7 +137,7 @@ pub fn program(
         }
     }
     let bytes = image::read(&elf)?;
-    let flash = image::flat(&bytes, board.memory().part.flash)?;
+    let flash = image::flat(&bytes, board.memory.part.flash)?;
     image::check(&bytes)?;
     fs::write(elf.with_extension("bin"), flash)?;
     // Programs are in the first one, libraries in the second one.

@@ -129,7 +129,7 @@ fn check_list(list: io::Result<Output>) -> Result<()> {
 impl Options {
     /// Returns probe-rs with the part and the probe.
     pub fn probe_rs(&self, subcommand: &str) -> Command {
-        let part = self.given.board().memory().part.name;
+        let part = self.given.board().memory.part.name;
         let mut command = Command::new("probe-rs");
         command.args([subcommand, "--chip", self.chip.as_deref().unwrap_or(part)]);
         if let Some(probe) = &self.probe {

@@ -160,7 +160,7 @@ impl Options {
         let flat = |elf: &Path| {
             let bytes = image::read(elf)?;
             let entry = image::parse(&bytes).map(|elf| object::Object::entry(&elf) as u32)?;
-            Ok::<_, anyhow::Error>((image::flat(&bytes, board.memory().part.flash)?, entry))
+            Ok::<_, anyhow::Error>((image::flat(&bytes, board.memory.part.flash)?, entry))
         };
         if self.plain || self.board.given.is_given() {
             let (bytes, entry) = flat(&self.board.given.elf(workspace)?)?;

@@ -112,11 +112,8 @@ mod tests {
     fn every_part_is_checked_and_with_slots_and_without() {
         let checked = |is: &dyn Fn(&Row) -> bool| PARTS.iter().any(|(_, board)| is(board));
         for board in Row::ALL {
-            let part = board.memory().part;
-            assert!(
-                checked(&|of| of.memory().part.flash == part.flash),
-                "{board}"
-            );
+            let part = board.memory.part;
+            assert!(checked(&|of| of.memory.part.flash == part.flash), "{board}");
             let has_slots = board.fixed.is_empty();
             assert!(checked(&|of| of.fixed.is_empty() == has_slots), "{board}");
         }

@@ -198,7 +198,7 @@ pub fn image_by(
 pub fn unsigned(board: &Row, slot: Slot, elf: &[u8], sources: &Sources) -> Result<Vec<u8>> {
     let layout = board.layout();
     let address = layout.slots[slot as usize];
-    let mut flash = image::flat(elf, board.memory().part.flash)?;
+    let mut flash = image::flat(elf, board.memory.part.flash)?;
     let start = (address + HEADER - FLASH_BASE) as usize;
     let erased = |bytes: &[u8]| bytes.iter().all(|byte| *byte == 0xFF);
     let begins = flash

@@ -91,7 +91,7 @@ pub fn limit(board: &Row, slot: Option<Slot>) -> Bytes {
         Some(_) => board.layout().slot - HEADER,
         None => board.store().first - FLASH_BASE,
     };
-    let memory = board.memory();
+    let memory = board.memory;
     [flash, memory.least().ram - memory.stack]
 }
 

@@ -46,7 +46,7 @@ fn at(
 ) -> Result<Boot, String> {
     let layout = Layout::of(map).ok_or("the simulator does not know this board")?;
     let slot = map.layout().slots[0];
-    let mut flash = vec![0xFF; map.memory().part.flash as usize];
+    let mut flash = vec![0xFF; map.memory.part.flash as usize];
     let at = (slot - FLASH_BASE) as usize;
     let place = flash.get_mut(at..at + image.len());
     place.ok_or("the image is too long")?.copy_from_slice(image);

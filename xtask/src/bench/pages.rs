@@ -82,7 +82,7 @@ fn picture_of_the_memory_has_the_sizes_of_the_baselines() {
         let [flash, ram] = ["flash", "ram"].map(|key| bench.figure("image", key));
         let end = u64::from(FLASH_BASE) + flash;
         // The stack is not counted. What a reset keeps is counted, and lies at the end of the RAM.
-        let variables = u64::from(RAM_BASE + board.memory().stack) + ram - 512;
+        let variables = u64::from(RAM_BASE + board.memory.stack) + ram - 512;
         check(
             "docs/images/memory.svg",
             &[

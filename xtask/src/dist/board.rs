@@ -120,7 +120,7 @@ pub fn slots(board: &Row) -> [String; 2] {
 /// directory.
 pub fn finish(board: &Row, out: &Path, images: &[Vec<u8>; 2]) -> Result<()> {
     let elf = fs::read(out.join(format!("{board}-loader.elf")))?;
-    let loader = image::flat(&elf, board.memory().part.flash)?;
+    let loader = image::flat(&elf, board.memory.part.flash)?;
     let entry = image::parse(&elf)?.entry() as u32;
     let [a, _] = images;
     let complete = flash::loaded(board, Slot::A, loader, a.clone());

@@ -16,7 +16,7 @@ use super::{Elf, FLASH_BASE, RAM_BASE, Symbol, demangled};
 const FLASH: Range<u32> = {
     let (mut bytes, mut n) = (0, 0);
     while n < Row::ALL.len() {
-        let part = Row::ALL[n].memory().part;
+        let part = Row::ALL[n].memory.part;
         if part.flash > bytes {
             bytes = part.flash;
         }

@@ -32,7 +32,7 @@ fn assert_has(file: &str, lines: &str) {
 fn memories_and_clocks_are_those_of_the_part() {
     for board in MODIO {
         let file = format!("{board}.repl");
-        let part = board.memory().part;
+        let part = board.memory.part;
         assert_has(&file, &format!("\nflash:\n    size: {:#x}\n", part.flash));
         assert_has(&file, &format!("\nsram:\n    size: {:#x}\n", part.ram));
         // The flash size register (RM0008 45.1).
@@ -100,7 +100,7 @@ fn pins_are_those_of_the_board() {
 #[test]
 fn commands_know_the_memory_of_the_board() {
     for board in MODIO {
-        let (layout, ram) = (board.layout(), board.memory().part.ram);
+        let (layout, ram) = (board.layout(), board.memory.part.ram);
         let (store, plain) = (layout.store.first, board.store().first);
         let bytes = 2 * layout.store.bytes;
         let memory = format!(
