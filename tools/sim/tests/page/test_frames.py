@@ -174,6 +174,8 @@ class StartedAgain(OnPage):
         first.close()
         expect(page.locator("#connection")).to_have_text(re.compile("^OFFLINE: .* does not answer"))
         expect(page.locator("#board")).to_have_attribute("inert", "")
+        # One answer of the new one is lost.
+        page.route("**/api/frames", lambda route: route.fulfill(status=503), times=1)
         second = Simulator.of(http=address, module="4do")
         self.addCleanup(second.close)
         master = second.master()

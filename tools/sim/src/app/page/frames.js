@@ -8,6 +8,10 @@ import { byId, element, setText } from "/ui.js";
 const KEPT = 500;
 /** Time after which a request without a reply is marked. */
 const PATIENCE_MS = 1000;
+/** Time after which the frames are fetched again when the simulator does not answer. */
+const RETRY_MS = 2000;
+/** The timer of that. */
+let retry;
 let frames = [];
 /** Number of the last frames that have no row yet. */
 let waiting = 0;
@@ -128,24 +132,28 @@ function addMissing(all) {
   all.slice(-KEPT).forEach(append);
 }
 
-/** Fetches the frames since the last one. */
+/** Fetches the frames since the last one. Until the simulator has answered, it is not known whether it has started again, so
+ * new frames wait. */
 export async function fetchMissed() {
   held ??= [];
-  try {
-    const answer = await get("/api/frames");
-    if (answer !== null && unwanted) {
-      const since = held?.[0]?.number ?? Infinity;
-      const cleared = answer.frames.filter((frame) => frame.number < since);
-      last = cleared.at(-1) ?? last;
-    } else if (answer !== null) {
-      addMissing(answer.frames);
-    }
-  } finally {
-    const arrived = held ?? [];
-    held = null;
-    unwanted = false;
-    arrived.forEach(append);
+  clearTimeout(retry);
+  const answer = await get("/api/frames").catch(() => null);
+  if (answer === null) {
+    clearTimeout(retry);
+    retry = setTimeout(fetchMissed, RETRY_MS);
+    return;
   }
+  if (unwanted) {
+    const since = held?.[0]?.number ?? Infinity;
+    const cleared = answer.frames.filter((frame) => frame.number < since);
+    last = cleared.at(-1) ?? last;
+  } else {
+    addMissing(answer.frames);
+  }
+  const arrived = held ?? [];
+  held = null;
+  unwanted = false;
+  arrived.forEach(append);
 }
 
 /** Connects the filter and the button that clears the log. Sets the functions that are called with each frame, and when

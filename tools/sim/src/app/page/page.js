@@ -20,7 +20,7 @@ let events = null;
 function begin(state) {
   show(state);
   connect.fetchEndpoints().catch(() => {});
-  frames.fetchMissed().catch(() => {});
+  frames.fetchMissed();
 }
 
 /** Shows a later state. Drops a state that is older than the one shown. */
@@ -65,7 +65,7 @@ function listen() {
     isFirst = false;
   });
   events.addEventListener("frame", (event) => frames.add(JSON.parse(event.data)));
-  events.addEventListener("lost", () => frames.fetchMissed().catch(() => {}));
+  events.addEventListener("lost", () => frames.fetchMissed());
 }
 
 async function fetchFindings() {
