@@ -35,7 +35,7 @@ use std::time::Duration;
 
 use ratatui::layout::Rect;
 use tokio::sync::mpsc::unbounded_channel;
-use tokio::time::{Instant, MissedTickBehavior, interval};
+use tokio::time::{Instant, MissedTickBehavior, interval, timeout};
 
 use self::input::Action;
 use self::messages::Update;
@@ -50,6 +50,9 @@ use crate::trace;
 
 /// Interval at which the display is drawn. The ages of values increase without messages.
 const FRAME: Duration = Duration::from_millis(100);
+
+/// Longest time from the loss of a closed terminal to the signal.
+const HANGUP: Duration = Duration::from_millis(500);
 
 /// Shows the unit until the user quits. Fails without a terminal, or without a modio at the start. A unit that is lost
 /// later is shown as lost.
@@ -124,10 +127,8 @@ pub async fn run(
             event = events.recv() => {
                 let event = match event {
                     Some(Ok(event)) => event,
-                    Some(Err(error)) => {
-                        return Err(Failure::usage(format!("the terminal is lost: {error}")));
-                    }
-                    None => return Err(Failure::usage("the terminal is lost")),
+                    Some(Err(error)) => return lost(ended, &error.to_string()).await,
+                    None => return lost(ended, "no more input").await,
                 };
                 match input::event(&mut model, &event, area, Instant::now()) {
                     Action::None => {}
@@ -160,7 +161,9 @@ pub async fn run(
                 area = frame.area();
                 draw::draw(frame, &mut model, Instant::now());
             });
-            drawn.map_err(|error| Failure::usage(format!("the terminal is lost: {error}")))?;
+            if let Err(error) = drawn {
+                return lost(ended, &error.to_string()).await;
+            }
             dirty = false;
         }
     }
@@ -177,6 +180,13 @@ async fn first(device: &mut Device) -> Result<Option<Failure>, Failure> {
     // The poller learns the same again, from the stored description.
     device.refresh = false;
     Ok(failure)
+}
+
+/// Ends without a terminal. If it has been closed, the signal of that follows, and this is no failure.
+async fn lost(ended: impl Future<Output = ()>, why: &str) -> Result<(), Failure> {
+    timeout(HANGUP, ended)
+        .await
+        .map_err(|_| Failure::usage(format!("the terminal is lost: {why}")))
 }
 
 /// Returns when the system asks the program to end, or when the terminal has been closed.
