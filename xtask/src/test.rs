@@ -2,6 +2,7 @@
 //! documentation with every warning an error, and steps that take longer.
 
 use std::env;
+use std::num::NonZero;
 use std::thread;
 
 use In::{Ci, Host, Night, Test};
@@ -47,13 +48,6 @@ const AT_SLOW: Names = [
     "analog_ line_stays rs232::frames rs232::reply rs232::save scan_finds timing::",
 ];
 
-/// Those that depend on an oscillator or on the converter. The fast corner has the instructions of the nominal one.
-const AT_FAST: Names = [
-    "analog_inputs:: boot:: clock:: hung_task:: loading::the_ timing::",
-    "analog:: boot:: timing::",
-    "analog_ line_stays rs232::reply timing::",
-];
-
 /// Which command runs a step when no step is named.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum In {
@@ -82,7 +76,7 @@ type OfBoard = fn(&mut Workspace, &'static Row) -> Result<()>;
 /// The steps in the order in which they run: command, name, description, function. The names do not change. A step that
 /// runs for each board has the board's number or name at the end of its name, such as `image-02` or `image-eth-io5r`. The
 /// name without it, `image`, means all of them.
-const STEPS: [(In, &str, &str, Run); 24] = [
+const STEPS: [(In, &str, &str, Run); 23] = [
     (Ci, "fmt", "formatting", Once(lint::formatting)),
     (Ci, "lint-host", "lints, host", Once(lint::host)),
     (Ci, "lint", "lints, target", EachPart(lint::target)),
@@ -118,24 +112,18 @@ const STEPS: [(In, &str, &str, Run); 24] = [
     ),
     (
         Ci,
-        "sim-fast",
-        "sim, fast corner",
-        Once(|workspace| sim_at(workspace, "fast", AT_FAST)),
-    ),
-    (
-        Ci,
         "bench",
         "instructions and bytes",
         EachOfModio(bench::check),
     ),
     (Ci, "peers", "Modbus servers, briefly", Once(peers::check)),
+    (Ci, "fuzz", "fuzz targets, briefly", Once(fuzz::check)),
     (
-        Ci,
+        Night,
         "adding",
         "the module and the board of the documents",
         Once(adding::check),
     ),
-    (Ci, "fuzz", "fuzz targets, briefly", Once(fuzz::check)),
     (Night, "corners", "sim, both corners", Once(corners)),
 ];
 
@@ -279,7 +267,14 @@ fn unit(workspace: &mut Workspace) -> Result<()> {
     } else {
         cargo.args(ALL).args(["--features", SUITE]);
     }
+    // The tests of modioctl mostly wait.
+    cargo.env("RUST_TEST_THREADS", threads(3).to_string());
     command::run(cargo.arg("--no-fail-fast"))
+}
+
+/// Returns this number of threads for each core.
+fn threads(each: usize) -> usize {
+    each * thread::available_parallelism().map_or(1, NonZero::get)
 }
 
 fn image(workspace: &mut Workspace, board: &'static Row) -> Result<()> {
@@ -300,8 +295,7 @@ fn suite(workspace: &mut Workspace) -> Result<()> {
 
 fn tool(workspace: &mut Workspace) -> Result<()> {
     // The simulators follow the wall clock, so the tests mostly wait.
-    let threads = thread::available_parallelism().map_or(2, |cores| cores.get() + 1);
-    let threads = format!("--test-threads={threads}");
+    let threads = format!("--test-threads={}", threads(2));
     let boards = [&MODIO_02, &MODIO_08];
     let has_node = which::which("node").is_ok();
     let tests = match has_node {

@@ -51,7 +51,7 @@ def all_files(directories: list[pathlib.Path]) -> int:
         if ended.returncode != 0:
             failed.append(file.name)
 
-    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+    with concurrent.futures.ThreadPoolExecutor(2 * (os.cpu_count() or 1)) as pool:
         for file, ended in zip(side_by_side, pool.map(run, side_by_side)):
             report(file, ended)
     for file in files:
