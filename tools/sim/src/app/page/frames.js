@@ -8,10 +8,6 @@ import { byId, element, setText } from "/ui.js";
 const KEPT = 500;
 /** Time after which a request without a reply is marked. */
 const PATIENCE_MS = 1000;
-/** Time after which the frames are fetched again when the simulator does not answer. */
-const RETRY_MS = 2000;
-/** The timer of that. */
-let retry;
 let frames = [];
 /** Number of the last frames that have no row yet. */
 let waiting = 0;
@@ -132,17 +128,15 @@ function addMissing(all) {
   all.slice(-KEPT).forEach(append);
 }
 
+/** Whether new frames are held until the simulator has answered. */
+export const isHolding = () => held !== null;
+
 /** Fetches the frames since the last one. Until the simulator has answered, it is not known whether it has started again, so
  * new frames wait. */
 export async function fetchMissed() {
   held ??= [];
-  clearTimeout(retry);
   const answer = await get("/api/frames").catch(() => null);
-  if (answer === null) {
-    clearTimeout(retry);
-    retry = setTimeout(fetchMissed, RETRY_MS);
-    return;
-  }
+  if (answer === null) return;
   if (unwanted) {
     const since = held?.[0]?.number ?? Infinity;
     const cleared = answer.frames.filter((frame) => frame.number < since);

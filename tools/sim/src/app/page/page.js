@@ -76,10 +76,11 @@ async function fetchFindings() {
   byId("findings").replaceChildren(...(items.length > 0 ? items : [element("li", {}, "none")]));
 }
 
-/** Reads the boards, the findings and the faults, which are in no event. */
+/** Reads the boards, the findings and the faults, which are in no event, and again the frames if the answer was lost. */
 function poll() {
   boards.refresh(choose).catch(() => {});
   fetchFindings().catch(() => {});
+  if (frames.isHolding()) frames.fetchMissed();
   if (!byId("faults-section").hidden) faults.refresh();
 }
 
