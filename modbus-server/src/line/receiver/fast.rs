@@ -43,7 +43,8 @@ impl<U: Units> Receiver<'_, U> {
         self.state = self.state & !FOLLOWS | QUIET;
     }
 
-    /// Drops what is in front of the reply of Fast Modbus that the last three characters begin, if they do. While units
+    /// Drops what is in front of the reply of Fast Modbus that the last three characters begin, if they do. What follows is
+    /// the reply, whether or not it arrives whole: its characters come too fast to look for another beginning. While units
     /// arbitrate, several start bits can overlap, so that these characters need not be FF. A frame that begins as a request
     /// for this unit stays whole up to its length, whatever is in it.
     pub(super) fn seek_reply(&mut self) {
@@ -62,7 +63,7 @@ impl<U: Units> Receiver<'_, U> {
         if begins_reply(adu.get(at), adu.get(at + 1), adu.get(at + 2)) {
             adu.clear();
             self.check = crc::START;
-            self.state &= FOLLOWS | SEEKS;
+            self.state = QUIET;
             // No byte is overwritten before it is read.
             for n in 0..3 {
                 let byte = adu.get(at + n);

@@ -287,5 +287,22 @@ fn scan_finds_units_whose_start_bits_are_seen_by_an_interrupt() {
             let units: Vec<u8> = found.iter().map(|(_, unit)| *unit).collect();
             assert_eq!(units, [1, 1, 1], "{baud:?}");
         }
+        // A unit that is not found hears the reply of another one, and a character is due each 12 us.
+        let lost: Vec<u16> = (master.find_all().into_iter())
+            .map(|(serial, _)| overruns(&mut master, serial))
+            .collect();
+        assert!(lost.iter().sum::<u16>() <= 2, "{baud:?}: {lost:?}");
     }
+}
+
+/// Returns the messages that the unit with this serial number has lost by overruns.
+fn overruns(master: &mut Master, serial: u32) -> u16 {
+    let [a, b, c, d] = serial.to_be_bytes();
+    let [high, low] = state::OVERRUNS.to_be_bytes();
+    let request = [0xFD, 0x46, 8, a, b, c, d, 3, high, low, 0, 1];
+    let (reply, _) = master.ask(&request, 0).expect("the unit replies");
+    let [.., high, low] = reply[..] else {
+        panic!("{reply:02X?}");
+    };
+    u16::from_be_bytes([high, low])
 }
