@@ -124,17 +124,16 @@ impl<'a, U: Units> Receiver<'a, U> {
     /// arbitration.
     #[inline(always)]
     pub fn character(&mut self, byte: u8, faults: Faults) -> bool {
-        // Errors are not counted while QUIET, so a good character needs no other treatment then. At 921600 bit/s there is no
-        // time for another one.
-        let quiet = if U::FAST { QUIET } else { 0 };
-        let special = self.state & !quiet | u16::from(faults.bits());
+        let special = self.state | u16::from(faults.bits());
         if special != 0 {
-            if special != IDLE {
+            // While QUIET errors are not counted, so a good character needs no other treatment. At 921600 bit/s there is no
+            // time for it.
+            if special != IDLE && !(U::FAST && special == QUIET) {
                 self.special(byte, faults);
                 return U::FAST && self.state & ASCII == 0;
             }
             // The first character of an RTU frame needs no other treatment, because everything is prepared for it.
-            self.state &= quiet;
+            self.state &= !IDLE;
         }
         let check = crc::step(self.check, byte);
         self.check = check;
