@@ -19,7 +19,7 @@ use modbus_server::{Adu, Server, crc};
 use modio_drivers::ChannelStatus;
 use modio_drivers::{Kind, Scale};
 use register_map::board::{EthIo5r, MODIO_02, MODIO_08, Modio02, Modio08};
-use register_map::{Module, configuration as at};
+use register_map::{Module, configuration as at, state as state_map};
 
 use super::*;
 use crate::config::Settings;
