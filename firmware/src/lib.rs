@@ -17,6 +17,7 @@ pub mod links;
 pub mod outputs;
 pub mod repairs;
 pub mod second;
+pub mod stage;
 pub mod start_up;
 pub mod store;
 pub mod update;

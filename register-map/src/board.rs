@@ -11,7 +11,7 @@ use crate::fixed::FixedPort;
 use crate::kind::Kind;
 use crate::layout::{Layout, TwoPages};
 use crate::part::Part;
-use crate::{BLOCKS, Module, Rule, Text, configuration, deadband, links, points, second};
+use crate::{BLOCKS, Module, Rule, Text, configuration, deadband, links, points, second, stage};
 
 pub use crate::count::{Count, Each, Exactly};
 use rows::ROWS;
@@ -28,6 +28,10 @@ pub trait Board: Copy + fmt::Debug + Eq + 'static {
     type Events: Count;
     /// 1 if it has START = as it was.
     type Kept: Count;
+    /// 1 if it has the stage of digital outputs.
+    type Stage: Count;
+    /// Its settings behind the links.
+    type BehindLinks: Count;
     /// 1 if it has a second line.
     type Second: Count;
     /// Number of its ports with points.
@@ -57,6 +61,8 @@ pub struct Row {
     pub events: bool,
     /// START = as it was. As above.
     pub keeps_outputs: bool,
+    /// The stage of digital outputs: DEAD_TIME, MAX_ON, MIN_OFF. As above.
+    pub stage: bool,
     /// What the image is linked for.
     pub memory: Memory,
 }
@@ -170,6 +176,23 @@ impl Row {
         self.fixed.is_empty()
     }
 
+    /// Returns the addresses of the settings behind the links, all by point: DEADBAND, then those of the stage. The board
+    /// has one of the two, both or none.
+    #[must_use]
+    pub const fn behind_links(&self) -> Range<u16> {
+        let first = if self.events {
+            deadband::DEADBAND
+        } else {
+            stage::DEAD_TIME
+        };
+        let end = if self.stage {
+            stage::ADDRESSES.end
+        } else {
+            stage::DEAD_TIME
+        };
+        first..end
+    }
+
     /// Returns whether inputs can switch outputs.
     #[inline(always)]
     #[must_use]
@@ -215,6 +238,7 @@ impl Row {
             configuration::LORA..=configuration::LORA_FRAME_GAP => self.has_radio(),
             second::BUS_MESSAGES..=second::T15_GAPS => self.second.is_some(),
             _ if deadband::contain(address) => self.events,
+            _ if stage::contain(address) => self.stage,
             _ => self.has_links() || !links::contain(address),
         }
     }

@@ -73,7 +73,8 @@ codes! {
 }
 
 codes! {
-    /// The validity of an analog input's word. Always good for any other kind of point.
+    /// The validity of an analog input's word, and what the stage does with a digital output. Always good for any other kind
+    /// of point.
     #[derive(Default)]
     ChannelStatus {
         #[default]
@@ -86,6 +87,10 @@ codes! {
         OpenCircuit = 3 "open circuit",
         /// The sensor's wires touch.
         ShortCircuit = 4 "short circuit",
+        /// The output is to be on, and waits for DEAD_TIME or MIN_OFF, or its pair is switched by hand. No fault.
+        Waits = 5 "waits",
+        /// MAX_ON has ended the output. No fault.
+        Ended = 6 "ended by MAX_ON",
     }
 }
 

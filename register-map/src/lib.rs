@@ -47,6 +47,7 @@ mod port;
 pub mod record;
 mod rule;
 pub mod second;
+pub mod stage;
 pub mod state;
 pub mod update;
 mod value;
@@ -64,7 +65,7 @@ pub use value::{Field, Unit, Value};
 pub use values::Values;
 
 /// Every block, in ascending order of the addresses.
-pub static BLOCKS: [&Block; 10] = [
+pub static BLOCKS: [&Block; 11] = [
     &points::BLOCK,
     &name::BLOCK,
     &configuration::BLOCK,
@@ -75,4 +76,5 @@ pub static BLOCKS: [&Block; 10] = [
     &edges::BLOCK,
     &links::BLOCK,
     &deadband::BLOCK,
+    &stage::BLOCK,
 ];

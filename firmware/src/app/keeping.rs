@@ -5,7 +5,7 @@ use core::array;
 
 use board_support::{boards::SLOTS, kept};
 use firmware::kept_outputs::half_word_of;
-use modio_drivers::{CHANNELS, Channels, Code, DacLink, Kind};
+use modio_drivers::{CHANNELS, Code, DacLink, Kind};
 
 use crate::board::{BOARD, Device};
 
@@ -33,7 +33,7 @@ impl Kept {
             for (slot, ((port, outputs), dac)) in
                 ports.iter().zip(&kept.outputs).zip(dacs).enumerate()
             {
-                keep_slot(slot, *outputs, port.channels(), dac);
+                keep_slot(slot, *outputs, port.channels().bits(), dac);
             }
             kept::keep_held(kept.held);
         }
@@ -46,27 +46,19 @@ impl Kept {
         kept
     }
 
-    /// Keeps the outputs that a scan has driven: their channels, those with a pulse, which is over after a reset, the codes
-    /// of the DACs, and the outputs that a link holds and those that are at SAFE.
+    /// Keeps the outputs that a scan has driven: the digital ones of each slot as they were commanded, but those with a pulse,
+    /// which is over after a reset, the codes of the DACs, and the outputs that a link holds and those that are at SAFE.
     // Not inlined into the scan, whose frame is large.
     #[inline(never)]
-    pub fn keep(
-        &mut self,
-        channels: &[Channels; SLOTS],
-        pulsing: &[u8; SLOTS],
-        dacs: &[DacLink; SLOTS],
-        held: [u32; 2],
-    ) {
+    pub fn keep(&mut self, coils: &[u8; SLOTS], dacs: &[DacLink; SLOTS], held: [u32; 2]) {
         // An output is marked only while its value is that of the link, or SAFE.
         if self.held != held {
             let [before, now] = [self.held, held];
             kept::keep_held([before[0] & now[0], before[1] & now[1]]);
         }
-        let slots = channels.iter().zip(pulsing).zip(dacs).zip(&self.outputs);
-        for (slot, (((channels, pulsing), dac), outputs)) in slots.enumerate() {
-            let mut channels = *channels;
-            channels.set_bits(*pulsing, 0);
-            keep_slot(slot, *outputs, &channels, dac);
+        let slots = coils.iter().zip(dacs).zip(&self.outputs);
+        for (slot, ((coils, dac), outputs)) in slots.enumerate() {
+            keep_slot(slot, *outputs, *coils, dac);
         }
         if self.held != held {
             self.held = held;
@@ -76,14 +68,14 @@ impl Kept {
 }
 
 /// Keeps the digital and the analog outputs of a slot, channel 1 in bit 0.
-fn keep_slot(slot: usize, [digital, analog]: [u8; 2], channels: &Channels, dac: &DacLink) {
+fn keep_slot(slot: usize, [digital, analog]: [u8; 2], coils: u8, dac: &DacLink) {
     if digital | analog == 0 {
         return;
     }
     let codes = dac.wanted.unwrap_or_default();
     for (channel, code) in codes.map(Code::get).into_iter().enumerate() {
         let value = if digital >> channel & 1 != 0 {
-            channels.bit(channel).into()
+            u16::from(coils >> channel & 1)
         } else if analog >> channel & 1 != 0 {
             code
         } else {

@@ -40,15 +40,17 @@ impl Scanning {
     pub fn new(
         mut modules: [Installed; SLOTS],
         sampler: Sampler,
-        device: &Device,
+        device: &mut Device,
         dacs: &mut [DacLink; SLOTS],
         powered_s: u32,
     ) -> Self {
-        let ports = device.points.ports();
-        for ((module, port), dac) in modules.iter_mut().zip(ports).zip(dacs.iter_mut()) {
-            module.driver().configure(port.settings());
-            // If a module cannot be driven, the first scan reports it.
-            let _ = module.driver().drive_outputs(port.channels(), dac);
+        for (slot, (module, dac)) in modules.iter_mut().zip(dacs.iter_mut()).enumerate() {
+            let channels = driven(device, slot, 0);
+            if let Some(port) = device.points.ports().get(slot) {
+                module.driver().configure(port.settings());
+                // If a module cannot be driven, the first scan reports it.
+                let _ = module.driver().drive_outputs(&channels, dac);
+            }
         }
         let kept = Kept::begin(device, dacs);
         Self {
@@ -82,22 +84,21 @@ impl Scanning {
             (0..SLOTS).for_each(|slot| device.lock(|device| device.run_links(slot)));
         }
         let mut channels = [Channels::new(); SLOTS];
-        let mut pulsing = [0; SLOTS];
+        let mut coils = [0; SLOTS];
         let (uptime_s, held) = device.lock(|device| {
-            let ports = device.points.ports();
             // Under the same lock as the words, because the settings define the units of the words.
             let revision = device.config.revision();
             if self.revision != revision {
                 self.revision = revision;
-                for (module, port) in self.modules.iter_mut().zip(ports) {
+                for (module, port) in self.modules.iter_mut().zip(device.points.ports()) {
                     module.driver().configure(port.settings());
                 }
             }
             for (slot, channels) in channels.iter_mut().enumerate() {
-                *channels = device.driven(slot);
+                *channels = driven(device, slot, passed);
             }
-            for (pulsing, port) in pulsing.iter_mut().zip(ports) {
-                *pulsing = port.pulsing();
+            for (coils, port) in coils.iter_mut().zip(device.points.ports()) {
+                *coils = port.channels().bits() & !port.pulsing();
             }
             let held = [device.held_outputs(), device.outputs_at_safe()];
             (device.state.uptime_s(), held)
@@ -112,7 +113,7 @@ impl Scanning {
                 *result = module.driver().drive_outputs(channels, dac);
             }
             if BOARD.has_links() {
-                self.kept.keep(&channels, &pulsing, dacs, held);
+                self.kept.keep(&coils, dacs, held);
             }
         });
         let mut codes = [[None; CHANNELS]; SLOTS];
@@ -195,6 +196,18 @@ impl Scanning {
             alive::end_interrupts(kept::marks());
         }
     }
+}
+
+/// Returns the channels of a slot to drive, `ms` milliseconds after the last scan.
+#[inline(always)]
+fn driven(device: &mut Device, slot: usize, ms: u32) -> Channels {
+    let bits = device.drive(slot, ms);
+    let mut channels = Channels::new();
+    if let Some(port) = device.points.ports().get(slot) {
+        channels = *port.channels();
+        channels.set_bits(u8::MAX, bits);
+    }
+    channels
 }
 
 /// Stores which channels failed. Returns whether that differs from before.

@@ -6,20 +6,19 @@ use register_map::codes::Command;
 use register_map::configuration::{
     COMMAND, FORMAT, KEY, LORA, LORA_FRAME_GAP, MODE, MODULE, RANGE, UNIT,
 };
-use register_map::{Run, Runs, deadband, points, runs};
+use register_map::{Run, Runs, points, runs, stage};
 
 use super::links::Links;
-use super::settings::{format_suits_mode, has_deadband, port_of};
+use super::settings::{format_suits_mode, is_behind, port_of};
 use super::{Config, HEARTBEAT_ALONE};
 
-/// Checks whether registers of DEADBAND exist. The first one does.
+/// Checks whether registers behind the links exist. The first one does.
 ///
 /// # Errors
 ///
 /// Exception 02 when the span goes beyond the last one.
-fn check_deadbands(span: Span) -> Result<(), Exception> {
-    let end = u32::from(deadband::BLOCK.last) + 1;
-    if span.end() <= end {
+fn check_behind<B: Board>(span: Span) -> Result<(), Exception> {
+    if span.end() <= B::ROW.behind_links().end.into() {
         Ok(())
     } else {
         Err(Exception::IllegalDataAddress)
@@ -35,7 +34,7 @@ impl<B: Board> Config<B> {
     pub fn check_read(&self, span: Span) -> Result<(), Exception> {
         match runs(B::ROW.rules(), span.start(), span.count()) {
             _ if Links::<B>::contain(span.start()) => self.check_links(span),
-            _ if has_deadband::<B>(span.start()) => check_deadbands(span),
+            _ if is_behind::<B>(span.start()) => check_behind::<B>(span),
             Some(_) if self.has(span) => Ok(()),
             _ => Err(Exception::IllegalDataAddress),
         }
@@ -75,9 +74,10 @@ impl<B: Board> Config<B> {
         let suits = if Links::<B>::contain(span.start()) {
             self.check_links(span)?;
             self.suits_the_links(span, words)
-        } else if has_deadband::<B>(span.start()) {
-            check_deadbands(span)?;
-            true
+        } else if is_behind::<B>(span.start()) {
+            check_behind::<B>(span)?;
+            let mut values = span.addresses().zip(words.iter());
+            values.all(|(address, value)| stage::allows(address, value))
         } else {
             let runs = runs(B::ROW.rules(), span.start(), span.count());
             let runs = runs.filter(|_| self.lets_write(span));

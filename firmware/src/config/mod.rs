@@ -1,5 +1,5 @@
-//! The configuration, registers 0x0100 to 0x01FF, the links, 0x0400 to 0x04FF, and DEADBAND, 0x0500 to 0x051F: which
-//! writes are allowed, the edited settings, the stored settings and the settings in force.
+//! The configuration, registers 0x0100 to 0x01FF, the links, 0x0400 to 0x04FF, and the settings behind them, 0x0500 to
+//! 0x057F: which writes are allowed, the edited settings, the stored settings and the settings in force.
 //!
 //! A setting has three values:
 //!
@@ -37,10 +37,12 @@ use register_map::configuration::{
     COMM_SOURCE, COMM_TIMEOUT, COMMAND, FILTER, HEARTBEAT, KEY, LORA, RESPONSE_DELAY, SAVE_EVERY_S,
     SAVES, SERIAL_LOW,
 };
+use register_map::stage::{DEAD_TIME, MAX_ON, MIN_OFF, max_on_ms};
 use register_map::state::status;
 use register_map::{Module, links as links_map, points};
 
 use crate::budget::Budget;
+use crate::stage::Times;
 pub use in_force::{LineConfig, Point, RadioConfig};
 use links::Links;
 use lock::Lock;
@@ -48,7 +50,7 @@ pub use origin::{LineName, Origin};
 use saving::Save;
 pub use settings::RestartValues;
 pub use settings::Settings;
-use settings::{RESTARTS, has_deadband, port_of};
+use settings::{RESTARTS, is_behind, port_of};
 
 /// A write that does nothing. It needs no lock, and every line may make it.
 const HEARTBEAT_ALONE: Span = Span::single(HEARTBEAT);
@@ -97,6 +99,8 @@ pub struct Config<B: Board> {
     written_links: Each<B::Ports, u8>,
     /// Points whose settings may have been written since they were last applied, point 0 in bit 0.
     written_points: u32,
+    /// Points with times of the stage that may have been written since they were last applied, point 0 in bit 0.
+    written_times: u32,
     revision: u16,
 }
 
@@ -127,6 +131,7 @@ impl<B: Board> Config<B> {
             left: 0,
             written_links: Each::all(0),
             written_points: u32::MAX,
+            written_times: u32::MAX,
             revision: 0,
         }
     }
@@ -213,13 +218,17 @@ impl<B: Board> Config<B> {
         }
         self.lock.open(self.origin.line);
         let mut command = None;
-        if (FILTER..links_map::LINKS).contains(&span.start()) || has_deadband::<B>(span.start()) {
+        if (FILTER..links_map::LINKS).contains(&span.start()) || is_behind::<B>(span.start()) {
             // These registers do not affect others.
             let edited = self.edited.slice_mut(span.start(), span.count());
             for (edited, value) in edited.iter_mut().zip(words.iter()) {
                 *edited = value;
             }
-            self.written_points |= points_of(span);
+            let points = points_of(span);
+            self.written_points |= points;
+            if is_behind::<B>(span.start()) {
+                self.written_times |= points;
+            }
         } else {
             for (address, value) in span.addresses().zip(words.iter()) {
                 match address {
@@ -228,7 +237,7 @@ impl<B: Board> Config<B> {
                     _ => {
                         self.edited.set(address, value);
                         if port_of(address).is_some() {
-                            self.written_points = u32::MAX;
+                            (self.written_points, self.written_times) = (u32::MAX, u32::MAX);
                         }
                     }
                 }
@@ -260,11 +269,16 @@ impl<B: Board> Config<B> {
         core::mem::replace(&mut self.written_points, 0)
     }
 
+    /// Returns the points with times of the stage that may have been written since the last call, point 0 in bit 0.
+    pub const fn take_written_times(&mut self) -> u32 {
+        core::mem::replace(&mut self.written_times, 0)
+    }
+
     /// COMMAND 3: sets every setting to its default. These values are not stored in flash.
     pub fn load_defaults(&mut self) {
         self.edited = Settings::defaults();
         self.written_links = Each::all(u8::MAX);
-        self.written_points = u32::MAX;
+        (self.written_points, self.written_times) = (u32::MAX, u32::MAX);
         self.revision = self.revision.wrapping_add(1);
     }
 
@@ -272,7 +286,7 @@ impl<B: Board> Config<B> {
     pub fn drop_changes(&mut self) {
         self.edited = self.saved;
         self.written_links = Each::all(u8::MAX);
-        self.written_points = u32::MAX;
+        (self.written_points, self.written_times) = (u32::MAX, u32::MAX);
         self.left = 0;
         self.revision = self.revision.wrapping_add(1);
     }
@@ -331,6 +345,19 @@ impl<B: Board> Config<B> {
         let first = points::of_port(port_at::<B>(index));
         self.is_in_force(index)
             .then(|| Point::of(&self.edited, first.wrapping_add(channel as u16)))
+    }
+
+    /// Returns the times of a digital output; `None` as [`point`](Self::point) does. `index` counts the ports with a slot.
+    #[must_use]
+    pub fn times(&self, index: usize, channel: usize) -> Option<Times> {
+        let first = points::of_port(port_at::<B>(index));
+        let point = first.wrapping_add(channel as u16);
+        let get = |first: u16| self.edited.get(first.wrapping_add(point));
+        self.is_in_force(index).then(|| Times {
+            dead: u32::from(get(DEAD_TIME)) * 10,
+            max_on: max_on_ms(get(MAX_ON)),
+            min_off: u32::from(get(MIN_OFF)) * 100,
+        })
     }
 
     /// Returns SERIAL_LOW.

@@ -8,9 +8,8 @@ use register_map::codes::{Format, Mode};
 use register_map::configuration::{
     self, COMMAND, FORMAT, HEARTBEAT, KEY, MODE, MODULE, RANGE, RULES, module_of,
 };
-use register_map::deadband::{self, DEADBAND};
 use register_map::points::{self, Kind};
-use register_map::{InForce, Module, Rule, links, rule_at};
+use register_map::{InForce, Module, Rule, links, rule_at, stage};
 
 use super::links::{Links, differences};
 use crate::links::{Link, OF_A_SLOT};
@@ -27,7 +26,7 @@ pub(super) const RESTARTS: usize = restarts();
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RestartValues(pub(super) [u16; RESTARTS]);
 
-/// A value for every register of the configuration, the links and DEADBAND. The values are
+/// A value for every register of the configuration, the links and the settings behind them. The values are
 /// consistent: a setting by point is always one that the point's module allows, and so is a link.
 // `Copy`, because copies of its parts one after another take more flash. Aligned, so that it is copied by words: requests
 // wait for the copy.
@@ -36,7 +35,8 @@ pub struct RestartValues(pub(super) [u16; RESTARTS]);
 pub struct Settings<B: Board> {
     /// By the low byte of the address. KEY, COMMAND, HEARTBEAT and gaps hold 0.
     values: [u16; VALUES],
-    deadbands: Each<B::Events, [u16; points::COUNT as usize]>,
+    /// DEADBAND, DEAD_TIME, MAX_ON and MIN_OFF, as far as the board has them.
+    behind: Each<B::BehindLinks, u16>,
     pub(super) links: Links<B>,
 }
 
@@ -46,7 +46,7 @@ impl<B: Board> Settings<B> {
     pub fn defaults() -> Self {
         let mut settings = Self {
             values: [0; VALUES],
-            deadbands: Each::all([0; points::COUNT as usize]),
+            behind: Each::all(0),
             links: Links::new(),
         };
         for (rule, address) in Addresses::from::<B>(KEY) {
@@ -79,7 +79,7 @@ impl<B: Board> Settings<B> {
                         && settings.takes_range(address, value)
                 }
                 None if Links::<B>::contain(address) => settings.has_link(address),
-                None if has_deadband::<B>(address) => true,
+                None if is_behind::<B>(address) => stage::allows(address, value),
                 None => continue,
             };
             if allowed {
@@ -138,7 +138,7 @@ impl<B: Board> Settings<B> {
         let behind = if Links::<B>::EXIST {
             links::LINKS
         } else {
-            DEADBAND
+            B::ROW.behind_links().start
         };
         Changed {
             settings: self,
@@ -159,29 +159,31 @@ impl<B: Board> Settings<B> {
     /// HEARTBEAT.
     #[inline]
     pub(super) fn slice_mut(&mut self, start: u16, count: u16) -> &mut [u16] {
-        let values = if has_deadband::<B>(start) {
-            self.deadbands.as_flattened_mut()
+        let (values, first) = if is_behind::<B>(start) {
+            (&mut self.behind[..], B::ROW.behind_links().start)
         } else {
-            &mut self.values[..]
+            (&mut self.values[..], KEY)
         };
-        values.get_mut(place(start, count)).unwrap_or_default()
+        values
+            .get_mut(place(start, first, count))
+            .unwrap_or_default()
     }
 
     /// Returns `count` values from an address on.
     #[inline]
     pub(super) fn slice(&self, start: u16, count: u16) -> &[u16] {
-        let values = if has_deadband::<B>(start) {
-            self.deadbands.as_flattened()
+        let (values, first) = if is_behind::<B>(start) {
+            (&self.behind[..], B::ROW.behind_links().start)
         } else {
-            &self.values[..]
+            (&self.values[..], KEY)
         };
-        values.get(place(start, count)).unwrap_or_default()
+        values.get(place(start, first, count)).unwrap_or_default()
     }
 
     /// Returns the number of settings that differ from those of `from`.
     pub(super) fn differences(&self, from: &Self) -> u16 {
         differences(&self.values, &from.values)
-            + differences(self.deadbands.as_flattened(), from.deadbands.as_flattened())
+            + differences(&self.behind, &from.behind)
             + self.links.differences(&from.links)
     }
 
@@ -233,8 +235,8 @@ impl<B: Board> Settings<B> {
         if !B::ROW.is_modular() {
             self.set_ranges(port);
         }
-        if B::ROW.events {
-            self.slice_mut(DEADBAND.wrapping_add(first), points::CHANNELS)
+        for block in B::ROW.behind_links().step_by(points::COUNT.into()) {
+            self.slice_mut(block.wrapping_add(first), points::CHANNELS)
                 .fill(0);
         }
         self.drop_links(Some(Links::<B>::slot_of(first)));
@@ -307,22 +309,24 @@ impl<B: Board> Settings<B> {
     }
 }
 
-/// Returns the indices of settings that are not those of links, by the low byte of the first one's address.
+/// Returns the indices of settings in values from the address `first` on.
 #[inline]
-fn place(start: u16, count: u16) -> Range<usize> {
-    let start = usize::from(start & 0xFF);
+fn place(start: u16, first: u16, count: u16) -> Range<usize> {
+    let start = usize::from(start.wrapping_sub(first));
     start..start.saturating_add(usize::from(count))
 }
 
 /// Returns whether an address is that of a setting, not one of a link.
 #[inline]
 const fn is_held<B: Board>(address: u16) -> bool {
-    address >> 8 == PAGE || has_deadband::<B>(address)
+    address >> 8 == PAGE || is_behind::<B>(address)
 }
 
-/// Returns whether the board has DEADBAND at this address.
-pub(super) const fn has_deadband<B: Board>(address: u16) -> bool {
-    B::ROW.events && deadband::contain(address)
+/// Returns whether an address is that of a setting behind the links.
+#[inline]
+pub(super) const fn is_behind<B: Board>(address: u16) -> bool {
+    let behind = const { B::ROW.behind_links() };
+    address.wrapping_sub(behind.start) < behind.end - behind.start
 }
 
 /// Returns whether a value of FORMAT is compatible with a value of MODE.
@@ -393,7 +397,7 @@ impl Iterator for Addresses {
 pub struct Changed<'a, B: Board> {
     settings: &'a Settings<B>,
     held: Addresses,
-    /// The register of a link, or of DEADBAND behind these, that is next after all others.
+    /// The register of a link, or behind the links, that is next after all others.
     behind: u16,
 }
 
@@ -419,7 +423,7 @@ impl<B: Board> Iterator for Changed<'_, B> {
                 return Some((address, value));
             }
         }
-        while has_deadband::<B>(self.behind) {
+        while is_behind::<B>(self.behind) {
             let address = self.behind;
             self.behind = address.wrapping_add(1);
             let value = self.settings.get(address);

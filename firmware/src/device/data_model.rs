@@ -49,7 +49,7 @@ impl Block {
     const fn of_others<B: Board>(span: Span) -> Self {
         match span.start().to_be_bytes() {
             [1 | 4, _] => Self::Config,
-            [5, _] if B::ROW.events => Self::Config,
+            [5, _] if B::ROW.events || B::ROW.stage => Self::Config,
             [0 | 2, _] | [3, 0x80..=0xFF] => Self::ReadOnly,
             [3, _] => Self::Pulses,
             _ => Self::Points,

@@ -42,6 +42,9 @@ impl<B: Board> Device<B> {
                 }
             }
         }
+        for (slot, held) in held.iter().enumerate() {
+            self.points.begin_stage(slot, *held);
+        }
         self.begin_links(|slot| held.get(slot).copied().unwrap_or_default());
     }
 

@@ -1,10 +1,12 @@
 //! Runs the links: inputs that switch outputs without a master.
 
-use modio_drivers::{CHANNELS, Channels, Codes, Kind};
+use modio_drivers::{CHANNELS, Codes, Kind};
+use register_map::Module;
 use register_map::board::{Board, Each};
 
 use super::{Device, IoPort, Points};
 use crate::links::{AFTER_POWER_ON_MS, OF_A_SLOT, Outputs, Source, Sources};
+use crate::stage::Held;
 
 /// The links of a device, while they run.
 #[derive(Debug)]
@@ -137,9 +139,13 @@ impl<B: Board> Device<B> {
             if let (Some(outputs), Some(port)) = (self.linking.outputs.get_mut(slot), port) {
                 outputs.set_up(links);
                 // A held output has what its links want, whatever this request has written.
-                let on = port.channels().bits() & !outputs.held() | outputs.held_on();
+                let held = outputs.held();
+                let on = port.channels().bits() & !held.outputs | held.on;
                 outputs.forget(of_changed, on);
                 outputs.written(written);
+                outputs.hold();
+                let held = outputs.held();
+                self.points.take_held(slot, held);
             }
         }
     }
@@ -214,7 +220,7 @@ impl<B: Board> Device<B> {
         let Some(outputs) = outputs.get_mut(slot) else {
             return;
         };
-        for index in bits(outputs.levels()) {
+        for index in bits(outputs.levels().into()) {
             let link = config.link(slot, index);
             let safe = points
                 .ports()
@@ -228,7 +234,14 @@ impl<B: Board> Device<B> {
             }
         }
         outputs.hold();
-        for index in bits(outputs.acting_edges(*alone)) {
+        let held = outputs.held();
+        points.take_held(slot, held);
+        let before = points
+            .ports()
+            .get(slot)
+            .map_or(0, |port| port.channels().bits());
+        let mut named = 0;
+        for index in bits(outputs.acting_edges(*alone).into()) {
             let link = config.link(slot, index);
             let place = link.source().and_then(|point| Points::<B>::index_of(point));
             if let Some((of, from)) = place
@@ -239,29 +252,38 @@ impl<B: Board> Device<B> {
                 && let output = port.channels().bit(index % CHANNELS)
                 && let Some(act) = link.at_edge(of.channels().bit(from), output)
             {
-                points.act(slot, index % CHANNELS, act, now);
+                named |=
+                    u8::from(points.act(slot, index % CHANNELS, act, now)) << (index % CHANNELS);
             }
         }
-        let held = outputs.held();
-        if held != 0 {
-            points.hold(slot, held, outputs.held_on());
+        if named != 0 {
+            points.settle_slot(slot, before, named);
+        }
+        if held.outputs != 0 {
+            points.hold(slot, held);
         }
     }
 
-    /// Returns the channels of a slot for the scan to drive. Outputs that links hold have what the links want, whatever
-    /// a request has written since the links ran.
-    #[must_use]
-    pub fn driven(&self, slot: usize) -> Channels {
-        let mut channels = Channels::new();
-        if let Some(port) = self.points.ports().get(slot) {
-            channels = *port.channels();
-        }
-        if B::ROW.has_links()
-            && let Some(outputs) = self.linking.outputs.get(slot)
-        {
-            channels.set_bits(outputs.held(), outputs.held_on());
-        }
-        channels
+    /// Returns the digital channels of a slot for the scan to drive, channel 1 in bit 0, `ms` milliseconds after the last scan, 0 for a scan because of a
+    /// write. Outputs that links hold have what the links want, whatever a request has written since the links ran.
+    pub fn drive(&mut self, slot: usize, ms: u32) -> u8 {
+        let links = self
+            .linking
+            .outputs
+            .get(slot)
+            .filter(|_| B::ROW.has_links());
+        let held = links.map_or_else(Held::default, Outputs::held);
+        let manual = if B::ROW.stage && self.config.modules().get(slot) == Some(&Module::Relay2) {
+            let bits = self
+                .points
+                .ports()
+                .get(slot)
+                .map_or(0, |port| port.channels().bits());
+            (bits & 0b11) << 2
+        } else {
+            0
+        };
+        self.points.drive(slot, held, manual, ms)
     }
 
     /// Ends the hold of the links that act only while there is no master: a master has written the outputs of a span.
@@ -280,6 +302,7 @@ impl<B: Board> Device<B> {
                 && let Some(outputs) = self.linking.outputs.get_mut(slot)
             {
                 outputs.end_hold(1 << channel);
+                self.points.take_held(slot, outputs.held());
             }
         }
     }
@@ -315,7 +338,7 @@ fn source<B: Board>(port: &IoPort<B>, sources: &Sources, channel: usize) -> Sour
 }
 
 /// Returns the numbers of the bits that are set.
-fn bits(mut mask: u8) -> impl Iterator<Item = usize> {
+pub(super) fn bits(mut mask: u32) -> impl Iterator<Item = usize> {
     core::iter::from_fn(move || {
         let bit = mask.trailing_zeros() as usize;
         let is_set = mask != 0;

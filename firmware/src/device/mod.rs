@@ -25,6 +25,7 @@ mod keeping;
 mod linking;
 mod points;
 mod port;
+mod staging;
 mod state;
 
 #[cfg(test)]
@@ -135,6 +136,15 @@ impl<B: Board> Device<B> {
         let written = self.config.take_written_points();
         let changed = self.changed_sources(written);
         self.for_each_point(written, IoPort::configure);
+        if B::ROW.stage {
+            for point in linking::bits(self.config.take_written_times()) {
+                if let Some((slot, channel)) = Points::<B>::index_of(point as u16)
+                    && let Some(times) = self.config.times(slot, channel)
+                {
+                    self.points.set_times(slot, channel, times);
+                }
+            }
+        }
         if written == u32::MAX
             || changed.iter().any(|channels| *channels != 0)
             || self.config.has_written_links()

@@ -14,9 +14,11 @@ use crate::links::Act;
 /// The points of the board's slots. Their port numbers are consecutive.
 #[derive(Debug)]
 pub struct Points<B: Board> {
-    ports: Each<B::Ports, IoPort<B>>,
+    pub(super) ports: Each<B::Ports, IoPort<B>>,
     /// Outputs that are at SAFE and were not commanded since, the first port's channel 1 in bit 0.
-    at_safe: Each<B::Kept, u32>,
+    pub(super) at_safe: Each<B::Kept, u32>,
+    /// Ports with an output that has a time of the stage, the first one in bit 0.
+    pub(super) staged: u8,
 }
 
 impl<B: Board> Points<B> {
@@ -26,6 +28,7 @@ impl<B: Board> Points<B> {
         Self {
             ports: Each::of(|slot| IoPort::new(config.kinds(slot))),
             at_safe: Each::all(0),
+            staged: 0,
         }
     }
 
@@ -98,9 +101,7 @@ impl<B: Board> Points<B> {
     #[must_use]
     pub fn status_of(&self, point: u16) -> ChannelStatus {
         self.place(Self::index(point))
-            .map_or(ChannelStatus::Good, |(port, channel)| {
-                port.channels.status(channel)
-            })
+            .map_or(ChannelStatus::Good, |(port, channel)| port.status(channel))
     }
 
     /// Checks that all points of a span exist and have one of these kinds; otherwise exception 02. Exception 04 when one
@@ -195,13 +196,24 @@ impl<B: Board> Points<B> {
     }
 
     /// Writes bit points that the check has accepted.
+    #[inline]
     pub fn write_bits(&mut self, span: Span, bits: Bits<'_>) {
         self.leave_safe(span);
+        // While no output has a time, the stage costs no more than this.
+        let before = self.coils_before();
         for (index, bit) in Self::indices(span).zip(bits.iter()) {
             if let Some((port, channel)) = self.place_mut(index) {
                 port.set_output(channel, bit);
             }
         }
+        if let Some(before) = before {
+            self.settle(before, Self::mask_of(Self::indices(span)), true);
+        }
+    }
+
+    /// Returns a bit for each of these indices.
+    const fn mask_of(indices: Range<usize>) -> u32 {
+        u32::MAX >> ((32 - (indices.end - indices.start)) & 31) << (indices.start & 31)
     }
 
     /// Writes word points that the check has accepted.
@@ -214,26 +226,21 @@ impl<B: Board> Points<B> {
         }
     }
 
-    /// Does what a link does to an output of a port, at the uptime `now` in ms.
-    pub(super) fn act(&mut self, slot: usize, channel: usize, act: Act, now: u32) {
+    /// Does what a link does to an output of a port, at the uptime `now` in ms. Returns false when a write of the output
+    /// would be rejected.
+    pub(super) fn act(&mut self, slot: usize, channel: usize, act: Act, now: u32) -> bool {
         let port = self.ports.get_mut(slot);
-        if port.is_some_and(|port| port.act(channel, act, now)) {
+        let done = port.is_some_and(|port| port.act(channel, act, now));
+        if done {
             self.leave_safe_now(slot * CHANNELS + channel, 1);
         }
-    }
-
-    /// Sets the outputs of a port that links hold, and those of them that are held on, channel 1 in bit 0.
-    pub(super) fn hold(&mut self, slot: usize, held: u8, on: u8) {
-        if let Some(port) = self.ports.get_mut(slot) {
-            port.hold(held, on);
-        }
-        for at_safe in self.at_safe.iter_mut() {
-            *at_safe &= !(u32::from(held) << ((slot * CHANNELS) & 31));
-        }
+        done
     }
 
     /// Sets the outputs to SAFE, but those of each slot that `but` returns, channel 1 in bit 0.
     pub(super) fn go_safe(&mut self, but: impl Fn(usize) -> u8) {
+        let before_safe = self.coils_before();
+        let mut named = 0;
         for index in 0..B::PORTS * CHANNELS {
             if but(index / CHANNELS) >> (index % CHANNELS) & 1 != 0 {
                 continue;
@@ -241,10 +248,15 @@ impl<B: Board> Points<B> {
             let before = self.commanded(index);
             if let Some((port, channel)) = self.place_mut(index)
                 && port.go_safe(channel, before)
-                && let [at_safe] = &mut self.at_safe[..]
             {
-                *at_safe |= 1 << (index & 31);
+                named |= 1 << (index & 31);
             }
+        }
+        for at_safe in self.at_safe.iter_mut() {
+            *at_safe |= named;
+        }
+        if let Some(before) = before_safe {
+            self.settle(before, named, false);
         }
     }
 

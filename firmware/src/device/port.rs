@@ -7,6 +7,7 @@ use register_map::limits;
 
 use crate::config::Point;
 use crate::links::Act;
+use crate::stage::Stage;
 
 /// The points of one port.
 #[derive(Clone, Copy, Debug)]
@@ -23,9 +24,10 @@ pub struct IoPort<B: Board> {
     /// Uptime in ms at which the pulse of a digital output ends.
     pulse_ends: [u32; CHANNELS],
     /// Outputs with a pulse, channel 1 in bit 0.
-    pulsing: u8,
+    pub(super) pulsing: u8,
     /// Changes of words that are events; 0 for 1/256 of the range.
     deadbands: Each<B::Events, [u16; CHANNELS]>,
+    pub(super) stage: Each<B::Stage, Stage>,
     /// What was commanded last, raw, of each output that was set to SAFE since then.
     before_safe: Each<B::Kept, [u16; CHANNELS]>,
     /// The inputs have been scanned once. From then on a rising edge counts.
@@ -48,6 +50,7 @@ impl<B: Board> IoPort<B> {
             pulse_ends: [0; CHANNELS],
             pulsing: 0,
             deadbands: Each::all([0; CHANNELS]),
+            stage: Each::all(Stage::new(of_kind(&kinds, Kind::BitOutput))),
             before_safe: Each::all([0; CHANNELS]),
             scanned: false,
             failing: 0,
@@ -147,12 +150,6 @@ impl<B: Board> IoPort<B> {
         self.pulsing
     }
 
-    /// Sets the digital outputs that links hold, and those of them that are held on, channel 1 in bit 0.
-    pub(super) const fn hold(&mut self, held: u8, on: u8) {
-        self.channels.set_bits(held, on);
-        self.pulsing &= !held;
-    }
-
     /// Returns SAFE of a digital output; `None` holds it.
     pub(super) fn safe_bit(&self, channel: usize) -> Option<bool> {
         let safe = self.safe.get(channel).copied().flatten();
@@ -162,9 +159,7 @@ impl<B: Board> IoPort<B> {
     /// Returns the channels of this kind, channel 1 in bit 0.
     #[must_use]
     pub fn channels_of(&self, kind: Kind) -> u8 {
-        let of_kind =
-            |mask, (channel, own): (usize, &Kind)| mask | u8::from(*own == kind) << channel;
-        self.kinds.iter().enumerate().fold(0, of_kind)
+        of_kind(&self.kinds, kind)
     }
 
     /// Does what a link does to an output at the uptime `now` in ms. Nothing happens when a write of the output would be
@@ -324,4 +319,10 @@ impl<B: Board> IoPort<B> {
             *pulses = 0;
         }
     }
+}
+
+/// Returns the channels of this kind, channel 1 in bit 0.
+fn of_kind(kinds: &[Kind; CHANNELS], kind: Kind) -> u8 {
+    let of_kind = |mask, (channel, own): (usize, &Kind)| mask | u8::from(*own == kind) << channel;
+    kinds.iter().enumerate().fold(0, of_kind)
 }

@@ -7,6 +7,7 @@
 //! Masks of outputs have channel 1 in bit 0.
 
 use super::{Link, OF_A_SLOT};
+use crate::stage::Held;
 
 /// Time in ms from the last write of a link until it acts. A master may write its registers one by one.
 pub const AFTER_A_WRITE_MS: u16 = 1_000;
@@ -161,6 +162,7 @@ impl Outputs {
     /// Ends the hold of links that act only while there is no master. Called when a master has written these outputs.
     pub const fn end_hold(&mut self, outputs: u8) {
         self.holding &= !of_both(outputs);
+        self.hold();
     }
 
     /// Returns the level links that act.
@@ -239,14 +241,11 @@ impl Outputs {
 
     /// Returns the outputs that are held.
     #[must_use]
-    pub const fn held(&self) -> u8 {
-        self.held
-    }
-
-    /// Returns the outputs that are held on.
-    #[must_use]
-    pub const fn held_on(&self) -> u8 {
-        self.on
+    pub const fn held(&self) -> Held {
+        Held {
+            outputs: self.held,
+            on: self.on,
+        }
     }
 
     /// Returns the outputs with a level link that always acts. Such a link holds its output once it has decided.

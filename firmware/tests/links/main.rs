@@ -253,7 +253,7 @@ impl Unit {
         device.tick(u32::from(self.now > 0));
         self.now += 1;
         (0..4).for_each(|slot| device.run_links(slot));
-        device.driven(1).bit(0)
+        device.drive(1, 0) & 1 != 0
     }
 }
 

@@ -21,6 +21,11 @@ macro_rules! boards {
                 type Ports = Exactly<{ $row.slots as usize }>;
                 type Events = Exactly<{ $row.events as usize }>;
                 type Kept = Exactly<{ $row.keeps_outputs as usize }>;
+                type Stage = Exactly<{ $row.stage as usize }>;
+                type BehindLinks = Exactly<{
+                    let addresses = $row.behind_links();
+                    (addresses.end - addresses.start) as usize
+                }>;
                 type Second = Exactly<{ $row.second.is_some() as usize }>;
             }
         )*
@@ -34,7 +39,7 @@ macro_rules! boards {
 const FX3U: Memory = Memory {
     part: STM32F103VC,
     smaller: None,
-    stack: 14 * KIB,
+    stack: 16 * KIB,
     interrupts: ["UART4", "USART1", "EXTI3"],
 };
 
@@ -51,6 +56,7 @@ boards! {
         second: Some(Second::Radio),
         events: false,
         keeps_outputs: false,
+        stage: false,
         memory: Memory {
             part: STM32F103CB,
             smaller: Some(STM32F103C8),
@@ -70,10 +76,11 @@ boards! {
         second: Some(Second::Radio),
         events: true,
         keeps_outputs: true,
+        stage: true,
         memory: Memory {
             part: STM32F103RC,
             smaller: None,
-            stack: 11 * KIB,
+            stack: 12 * KIB,
             interrupts: ["USART1", "USART3", "EXTI3"],
         },
     }
@@ -97,6 +104,7 @@ boards! {
         second: Some(Second::Rs232),
         events: true,
         keeps_outputs: true,
+        stage: true,
         memory: FX3U,
     }
     /// The FX3U-24MR's clone: an STM32F103VC.
@@ -122,6 +130,7 @@ boards! {
         second: Some(Second::Rs232),
         events: true,
         keeps_outputs: true,
+        stage: true,
         memory: FX3U,
     }
     /// The "eth_modbus_io5r": an STM32F103CB.
@@ -141,6 +150,7 @@ boards! {
         second: None,
         events: false,
         keeps_outputs: false,
+        stage: false,
         memory: Memory {
             part: STM32F103CB,
             smaller: None,

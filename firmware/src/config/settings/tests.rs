@@ -185,11 +185,11 @@ fn each_changed_setting_is_in_the_record<B: Board>() {
     });
     let (settings, _) = super::Settings::<B>::load(modules.chain(settings));
     let changed: Vec<_> = settings.changed_from(0).collect();
-    let deadbands = if B::ROW.events { points::COUNT } else { 0 };
+    let behind = B::ROW.behind_links();
     let has = changed
         .iter()
-        .filter(|(address, _)| deadband::contain(*address));
-    assert_eq!(has.count(), usize::from(deadbands));
+        .filter(|(address, _)| behind.contains(address));
+    assert_eq!(has.count(), behind.len());
     let (stored, rejected) = super::Settings::<B>::load(changed.into_iter());
     assert_eq!((stored, rejected), (settings, 0));
     assert_ne!(stored, super::Settings::<B>::defaults());

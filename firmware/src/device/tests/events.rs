@@ -86,7 +86,7 @@ fn deadbands_are_settings_in_force_now_that_a_change_of_the_module_sets_to_0() {
     assert_eq!(rig.read(DEADBAND, 32).unwrap()[4..7], [9, 8, 0]);
     assert!(!is_event(&mut rig, 8));
     assert!(is_event(&mut rig, 9));
-    for (first, count) in [(DEADBAND - 1, 2), (DEADBAND + 31, 2), (DEADBAND + 32, 1)] {
+    for (first, count) in [(DEADBAND - 1, 2), (DEADBAND + 127, 2), (DEADBAND + 128, 1)] {
         assert_eq!(rig.read(first, count), Err(2));
         assert_eq!(rig.write(first, &std::vec![0; count.into()]), Err(2));
     }

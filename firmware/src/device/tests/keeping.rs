@@ -151,7 +151,7 @@ fn an_edge_link_is_kept_a_pulse_and_an_output_that_a_link_always_holds_are_not()
 }
 
 /// Returns what a reset now keeps.
-fn kept(rig: &Rig<Modio08>) -> KeptOutputs {
+pub(super) fn kept(rig: &Rig<Modio08>) -> KeptOutputs {
     let mut values = [0; 32];
     for (slot, port) in rig.device.points.ports().iter().enumerate() {
         for channel in 0..4 {

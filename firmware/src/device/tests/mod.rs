@@ -9,6 +9,7 @@ mod keeping;
 mod links;
 mod over_the_air;
 mod points;
+mod stage;
 mod state;
 mod updating;
 
