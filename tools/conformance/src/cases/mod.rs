@@ -24,6 +24,7 @@ mod power;
 mod read;
 mod remote;
 mod settings;
+mod stage;
 mod timing;
 mod wires;
 mod worked;
@@ -65,6 +66,7 @@ pub fn all() -> Vec<Case> {
         configuration::CASES,
         power::CASES,
         settings::CASES,
+        stage::CASES,
     ]
     .concat();
     all.sort_by_key(|case| !case.needs.contains(&Need::LockClosed));

@@ -212,7 +212,8 @@ fn modio_without_a_fault_passes_every_case_about_a_modio() {
 }
 
 fn assert_modio_passes(mut cases: Vec<Case>) {
-    cases.retain(|case| case.kind == Kind::Modio);
+    // The board of this modio has no output stage.
+    cases.retain(|case| case.kind == Kind::Modio && !case.name.starts_with("stage/"));
     for outcome in outcomes_of_modio(None, &cases) {
         let row = conformance::report::table::row(&outcome);
         assert_eq!(outcome.verdict, Verdict::Passed, "{row}");

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use modbus_line::LineFormat;
 use modbus_reference::Modio as Reference;
-use register_map::board::MODIO_02;
+use register_map::board::{MODIO_02, MODIO_08};
 use register_map::codes::{Baud, Format};
 use register_map::{Module, configuration as at, counters, points, runs, state};
 
@@ -35,7 +35,12 @@ pub struct Modio {
 
 impl Modio {
     pub fn new(fault: Option<ModioFault>) -> Self {
-        let mut modio = Reference::new(&MODIO_02, |_| Module::Relay2);
+        let board = if fault == Some(ModioFault::TimesWithoutEffect) {
+            &MODIO_08
+        } else {
+            &MODIO_02
+        };
+        let mut modio = Reference::new(board, |_| Module::Relay2);
         modio.bits[usize::from(INPUTS.start)] = true;
         Self {
             fault,

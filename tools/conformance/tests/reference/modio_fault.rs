@@ -68,6 +68,10 @@ faults! {
     RestartsBeforeReply => ["settings/reply-under-the-old-rate"],
     /// Uses 115200 bit/s when it is set to 230400.
     LacksARate => ["settings/every-rate"],
+    /// Has DEAD_TIME, MAX_ON and MIN_OFF without an effect.
+    TimesWithoutEffect => [
+        "stage/both-in-one-request", "stage/other-direction", "stage/master-repeats", "stage/shortest-time-off"
+    ],
     /// Uses even parity when it is set to odd.
     OddIsEven => ["settings/every-format"],
 }
