@@ -169,7 +169,7 @@ fn crashing(handler: &str) -> Vec<u8> {
 }
 
 /// Writes an image into slot B, and that it is confirmed, too, into the first record of the boot state.
-fn put_beside(flash: &mut [u8], image: &[u8]) {
+pub fn put_beside(flash: &mut [u8], image: &[u8]) {
     let layout = LAYOUT.board.layout();
     let slot = (layout.slots[1] - FLASH_BASE) as usize;
     flash[slot..slot + image.len()].copy_from_slice(image);

@@ -20,6 +20,7 @@ mod faults_of_slots;
 mod fitted;
 mod kept_outputs;
 mod links;
+mod outputs;
 
 #[path = "../image/boot.rs"]
 mod boot;
@@ -52,5 +53,7 @@ mod saving;
 mod self_description;
 #[path = "../image/stack.rs"]
 mod stack;
+#[path = "../image/stage.rs"]
+mod stage;
 #[path = "../image/timing.rs"]
 mod timing;

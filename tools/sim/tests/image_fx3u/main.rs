@@ -28,6 +28,8 @@ mod registers;
 #[path = "../image/rig.rs"]
 mod rig;
 mod rs232;
+#[path = "../image/stage.rs"]
+mod stage;
 #[path = "../image/timing.rs"]
 mod timing;
 
@@ -109,6 +111,28 @@ fn every_relay_is_at_its_point_and_missing_ones_are_exception_02() {
         [0x86, 2],
         "MODULE"
     );
+}
+
+const PAIR: stage::Pair = stage::Pair {
+    first: Y0 as u16,
+    inputs: 0,
+    unit,
+    set: |rig, input, on| set(rig, &format!("X{input}"), Value::Input(on)),
+    terminals: |rig| ["Y0", "Y1", "Y2"].map(|name| relay(rig, name)),
+};
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn scenarios_of_a_pair_of_relays_have_their_terminals() {
+    let played = stage::play_scenarios(&PAIR);
+    assert!(played >= 10, "{played}");
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn histories_of_a_pair_of_relays_have_every_change_of_a_terminal() {
+    let changes = stage::play_histories(&PAIR);
+    assert!(changes > 100, "{changes}");
 }
 
 #[test]

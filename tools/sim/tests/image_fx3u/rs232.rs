@@ -221,7 +221,7 @@ fn address_is_that_of_the_rs485_line_also_when_it_changes_and_in_recovery() {
     rig.exchange(&adu(
         &[&[0xFD, 0x46, 8][..], &serial, &[6, a, b, 0, 42]].concat()
     ));
-    assert_eq!(ask(&mut rig, &READ), []);
+    assert_eq!(ask(&mut rig, &READ), [0_u8; 0]);
     assert_eq!(ask(&mut rig, &[42, 2, 0, 0, 0, 3]), [42, 2, 1, 0]);
     drop(rig);
 
@@ -233,6 +233,6 @@ fn address_is_that_of_the_rs485_line_also_when_it_changes_and_in_recovery() {
         set(&mut rig, "RUN", Value::Switch(on));
     }
     rig.board.run_for(Time::from_ms(500));
-    assert_eq!(ask(&mut rig, &[9, 2, 0, 0, 0, 3]), []);
+    assert_eq!(ask(&mut rig, &[9, 2, 0, 0, 0, 3]), [0_u8; 0]);
     assert_eq!(ask(&mut rig, &[255, 2, 0, 0, 0, 3]), [255, 2, 1, 0]);
 }

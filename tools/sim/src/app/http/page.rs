@@ -16,7 +16,7 @@ const CSS: &str = "text/css; charset=utf-8";
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 
 /// Path, type and content of each file, except `/map.js`.
-pub const FILES: [(&str, &str, &str); 18] = [
+pub const FILES: [(&str, &str, &str); 19] = [
     ("/", HTML, include_str!("../page/index.html")),
     ("/page.css", CSS, include_str!("../page/page.css")),
     ("/board.css", CSS, include_str!("../page/board.css")),
@@ -26,6 +26,7 @@ pub const FILES: [(&str, &str, &str); 18] = [
     ("/boards.js", SCRIPT, include_str!("../page/boards.js")),
     ("/channels.js", SCRIPT, include_str!("../page/channels.js")),
     ("/chart.js", SCRIPT, include_str!("../page/chart.js")),
+    ("/coils.js", SCRIPT, include_str!("../page/coils.js")),
     ("/connect.js", SCRIPT, include_str!("../page/connect.js")),
     ("/events.js", SCRIPT, include_str!("../page/events.js")),
     ("/faults.js", SCRIPT, include_str!("../page/faults.js")),

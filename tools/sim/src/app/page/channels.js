@@ -1,6 +1,7 @@
 // The channels of a module: their controls and displays.
 
 import { inputs, outputs, address, pointName } from "/model.js";
+import { note } from "/coils.js";
 import { post, stream, isStreaming } from "/api.js";
 import { byId, element, select, setText } from "/ui.js";
 
@@ -18,13 +19,14 @@ export function buildChannel(slot, id, channel, number, redraw) {
   // A relay has two points: its jumper, and its coil with a number that is two higher.
   const at = channel.kind === "relay" ? number + 2 : number;
   const point = pointName(slot.port, at);
+  const coil = Number(address(slot.port, at));
   return element("div", { class: `channel ${channel.kind}`, role: "group", "aria-label": `${name} ${point}` },
     element("div", { class: "name" },
       element("span", {}, `${name} ${number}`), element("code", {}, point), element("code", {}, address(slot.port, at))),
-    ...control(slot, id, channel.kind, number, point, redraw));
+    ...control(slot, id, channel.kind, number, point, coil, redraw));
 }
 
-function control(slot, id, kind, number, point, redraw) {
+function control(slot, id, kind, number, point, coil, redraw) {
   const path = `${slot.path}channels/${number}`;
   const toggle = (key, label) => {
     const button = element("button", {
@@ -40,10 +42,11 @@ function control(slot, id, kind, number, point, redraw) {
     case "di":
       return [toggle("energised", `Digital input ${point}`)];
     case "do":
-      return [lamp(`Digital output ${point}`)];
+      return [lamp(`Digital output ${point}`), note(coil)];
     case "relay":
       return [
         lamp(`Coil of relay ${number}, ${point}`),
+        note(coil),
         toggle("manual", `Manual jumper of relay ${number}, ${pointName(slot.port, number)}`),
       ];
     case "ai":

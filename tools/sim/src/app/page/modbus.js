@@ -30,6 +30,13 @@ export async function read(first, count, label) {
   return reply && reply.slice(4).match(/.{4}/g).map((digits) => parseInt(digits, 16));
 }
 
+/** Returns `count` coils from `first` on; null if the unit does not return them. */
+export async function readCoils(first, count, label) {
+  const reply = await ask(`01${word(first)}${word(count)}`, label);
+  const bytes = reply && reply.slice(4).match(/../g).map((digits) => parseInt(digits, 16));
+  return bytes && Array.from({ length: count }, (_, n) => (bytes[n >> 3] >> (n & 7)) % 2 === 1);
+}
+
 /** Opens the lock and writes registers from `first` on, in one request. Returns whether the unit has taken them. */
 export async function write(first, words, label) {
   const open = `06${word(registers.key)}${word(registers.openingKey)}`;

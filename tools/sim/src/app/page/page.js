@@ -4,6 +4,7 @@ import * as api from "/api.js";
 import * as board from "/board.js";
 import * as boards from "/boards.js";
 import * as chart from "/chart.js";
+import * as coils from "/coils.js";
 import * as connect from "/connect.js";
 import * as faults from "/faults.js";
 import * as frames from "/frames.js";
@@ -33,6 +34,7 @@ function show(state) {
   chart.add(state);
   connect.show(state);
   links.show(state);
+  coils.show();
 }
 
 /** Shows whether the simulator answers. Without it the board cannot be operated. */
@@ -90,6 +92,7 @@ function choose(name) {
   board.forget();
   chart.reset();
   links.forget();
+  coils.forget();
   listen();
   faults.refresh();
 }
@@ -101,6 +104,7 @@ frames.listen(chart.addFrame, () => {
   chart.add(board.current());
 });
 links.listen();
+coils.listen();
 setInterval(chart.draw, DRAW_MS);
 setInterval(poll, POLL_MS);
 faults.refresh();

@@ -1,5 +1,6 @@
 // The terminals of a board with fixed inputs and outputs: their controls and displays, in the order on the board.
 
+import { note } from "/coils.js";
 import { post, stream, isStreaming } from "/api.js";
 import { address, numberOf, pointName, portOf } from "/model.js";
 import { byId, element, setText } from "/ui.js";
@@ -51,15 +52,15 @@ function buildTerminal({ name, kind, point }) {
     labels.push(element("code", {}, pointName(port, number)), element("code", {}, address(port, number)));
   }
   return element("div", { class: `channel ${kind}`, role: "group", "aria-label": `Terminal ${name}` },
-    element("div", { class: "name" }, ...labels), ...control(name, kind));
+    element("div", { class: "name" }, ...labels), ...control(name, kind, point));
 }
 
-function control(name, kind) {
+function control(name, kind, point) {
   const id = idOf(name);
   if (kind === "relay") {
     return [element("div", {
       id, class: "lamp", role: "switch", "aria-readonly": "true", "aria-checked": "false", "aria-label": `Relay ${name}`,
-    })];
+    }), note(point)];
   }
   if (kind === "output") return [element("span", { id, class: "reading" })];
   if (kind in SLIDERS) {
