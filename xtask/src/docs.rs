@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use register_map::points::Kind;
 use register_map::{
     BLOCKS, Block, Field, InForce, Module, Row, Rule, Scope, Text, Unit, Value, Values, codes,
-    configuration, counters, deadband, edges, fault, links, points, second,
+    configuration, counters, deadband, edges, fault, links, points, second, stage,
 };
 
 const INTRODUCTION: &str = "\
@@ -84,6 +84,12 @@ Only boards with [function 70](fast-modbus.md) have it. It is a setting as those
 point. A change of MODULE sets it to 0.
 ";
 
+const STAGE_NOTES: &str = "
+Settings as those of the configuration, on boards that have them; at points that are no digital outputs they are stored,
+without effect. MAX_ON 0x8000 is exception 03. A change of one begins the times of its output anew, with the output off; a
+change of MODULE sets them to 0: [outputs.md](outputs.md).
+";
+
 const LINK_NOTES: &str = "
 n is the point of a digital output of the module written last; other addresses are exception 02, and on a board with one
 slot all are. Links are settings: KEY protects them, COMMAND 1 saves them, and they are in force immediately. A link is
@@ -145,6 +151,8 @@ fn write_markdown(out: &mut impl Write) -> Result {
             out.write_str(LINK_NOTES)?;
         } else if block.first == deadband::BLOCK.first {
             out.write_str(DEADBAND_NOTES)?;
+        } else if block.first == stage::BLOCK.first {
+            out.write_str(STAGE_NOTES)?;
         }
     }
     Ok(())
@@ -156,7 +164,8 @@ fn write_registers(block: &Block, out: &mut impl Write) -> Result {
     {
         return write_fields(rule, text.name, fields, out);
     }
-    let settings = [configuration::BLOCK.first, deadband::BLOCK.first].contains(&block.first);
+    let settings = [&configuration::BLOCK, &deadband::BLOCK, &stage::BLOCK];
+    let settings = settings.iter().any(|other| other.first == block.first);
     out.write_str(if settings {
         "| address | name | values (default) | unit | in force | what |\n|---|---|---|---|---|---|\n"
     } else {

@@ -138,7 +138,7 @@ mod tests {
         let slot = limit(&MODIO_02, Some(Slot::B));
         assert_eq!(slot, [54_784, 11 * KIB]);
         assert_eq!(limit(&MODIO_02, None), [62 * KIB, 11 * KIB]);
-        assert_eq!(limit(&MODIO_08, Some(Slot::A)), [118_272, 37 * KIB]);
+        assert_eq!(limit(&MODIO_08, Some(Slot::A)), [118_272, 36 * KIB]);
         assert!(within(slot, slot).is_ok());
         for taken in [[slot[0] + 1, 0], [0, slot[1] + 1]] {
             let error = within(taken, slot).unwrap_err();

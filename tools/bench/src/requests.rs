@@ -21,7 +21,7 @@ const POINT: u32 = 700;
 const FOUR: u32 = 850;
 const SIXTEEN: u32 = 1500;
 const SHORT: u32 = 850;
-const SETTING: u32 = 1300;
+const SETTING: u32 = 1330;
 /// What a board that serves function 70 may take in addition: each frame may be a message of it.
 const FAST: u32 = 40;
 /// What a write of sixteen outputs may take in addition, because an output can start as it was: its command before SAFE is

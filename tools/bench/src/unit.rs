@@ -168,12 +168,21 @@ impl Unit {
             self.board.run_for(pause);
             *cost = self.count(&request.pdu)?;
         }
-        let mut to_first_byte = costs.each_ref().map(|cost| cost.to_first_byte);
-        to_first_byte.sort_unstable();
+        let median = |of: fn(&Cost) -> u32| {
+            let mut all = costs.each_ref().map(of);
+            all.sort_unstable();
+            all[2]
+        };
+        let to_first_byte = median(|cost| cost.to_first_byte);
+        // An instruction that another interrupt breaks off counts twice.
+        let byte_in = median(|cost| cost.byte_in);
         costs.sort_by_key(|cost| cost.transaction);
-        let [_, _, mut middle, _, _] = costs;
-        middle.to_first_byte = to_first_byte[2];
-        Ok(middle)
+        let [_, _, middle, _, _] = costs;
+        Ok(Cost {
+            to_first_byte,
+            byte_in,
+            ..middle
+        })
     }
 
     /// Counts every instruction of a transaction by its interrupt handler.
