@@ -9,13 +9,12 @@
 //! p3.1 switches p2.1 on below 15.0 off above 18.0
 //! ```
 
-use modio_description::Unit;
 use register_map::codes::{LinkAction, Signal};
 use register_map::links::{NO_SOURCE, WORDS};
 
 use crate::failure::Failure;
 use crate::names::{Book, Item, Meaning};
-use crate::value::{point_name, quantities, show, steps, words_of};
+use crate::value::{point_name, show, time_of_pulse, words_of};
 
 /// The words of no link.
 pub const NONE: [u16; WORDS as usize] = [NO_SOURCE, 0, 0, 0];
@@ -174,7 +173,10 @@ pub fn parse(book: &Book, text: &str) -> Result<Order, Failure> {
         "changes" => (LinkAction::Change, [0, 0]),
         "sets" => (LinkAction::Set, [0, 0]),
         "resets" => (LinkAction::Reset, [0, 0]),
-        "pulses" => (LinkAction::Pulse, [time(&values.join(" "))?, 0]),
+        "pulses" => (
+            LinkAction::Pulse,
+            [time_of_pulse(&values.join(" ")).map_err(Failure::usage)?, 0],
+        ),
         _ => thresholds(&source, values)?,
     };
     let [time_or_high, low] = values;
@@ -225,19 +227,6 @@ fn input(book: &Book, name: &str, verb: &str) -> Result<Item, Failure> {
             "{is}: use `{name} switches OUTPUT on above HIGH off below LOW`, or `on below LOW off above HIGH`"
         ))),
     }
-}
-
-fn time(text: &str) -> Result<u16, Failure> {
-    let tenths = Unit {
-        code: "s".to_owned(),
-        exponent: -1,
-        offset: 0,
-    };
-    let time = steps(text, &tenths).and_then(|time| u16::try_from(time).ok());
-    time.filter(|time| *time > 0).ok_or_else(|| {
-        let takes = quantities(1, u16::MAX.into(), &tenths);
-        Failure::usage(format!("the time of a pulse is {takes}, not {text:?}"))
-    })
 }
 
 /// Parses `on above HIGH off below LOW` or `on below LOW off above HIGH`, for this source.
@@ -370,7 +359,7 @@ mod tests {
         ] {
             assert!(wrong(text).contains("a link is `INPUT toggles"), "{text}");
         }
-        for time in ["", "0", "-1s", "90min", "6553.6", "0.05s"] {
+        for time in ["", "0", "-1s", "90d", "110min", "6553.6", "0.05s"] {
             let text = wrong(&format!("p1.1 pulses p2.1 for {time}"));
             assert!(text.contains("0.1 to 6553.5 s"), "{text}");
         }

@@ -33,6 +33,10 @@ pub fn values(item: &Item) -> String {
             let names: Vec<_> = fields.iter().map(|field| field.name.as_str()).collect();
             names.join(", ")
         }
+        // With the numbers, for a program that writes registers.
+        (_, Meaning::LongestOn) => {
+            "0, 0.1 to 3276.7 s (1 to 32767), or 1 to 32767 min (0x8001 to 0xFFFF)".to_owned()
+        }
         (Some(values), _) => takes(values, &unit),
         (None, Meaning::Bit) => "off | on".to_owned(),
         (None, _) => unit_name(&unit.code).to_owned(),

@@ -7,6 +7,7 @@ use modio_description::{
 use register_map::Row;
 use register_map::configuration::MODULE;
 use register_map::points::{CHANNELS, COUNT, PORTS};
+use register_map::stage::MAX_ON;
 
 use crate::failure::Failure;
 
@@ -67,6 +68,8 @@ pub enum Meaning {
     Value(Value),
     /// An analog point, with the meaning that its RANGE and SCALE select.
     Analog(Reading),
+    /// MAX_ON: 0, or a time in tenths of a second or in minutes.
+    LongestOn,
     /// The meaning is not known.
     Unknown,
 }
@@ -182,7 +185,22 @@ impl Book {
         names.iter().map(|name| self.find(name)).collect()
     }
 
+    /// Returns whether this is the name of a time of a digital output, and the unit has no such times.
+    pub fn lacks_stage(&self, name: &str) -> bool {
+        let is_time = matches!(
+            slug(name).rsplit_once('.'),
+            Some((_, "dead_time" | "max_on" | "min_off"))
+        );
+        let has = |of: &Description| of.registers.iter().any(|r| r.name == "DEAD_TIME");
+        is_time && self.description.as_ref().is_some_and(|of| !has(of))
+    }
+
     fn no_such(&self, name: &str, wanted: &str) -> String {
+        if self.lacks_stage(name) {
+            return format!(
+                "{name}: this unit has no DEAD_TIME, MAX_ON and MIN_OFF: only some boards have them, such as a modio-08, and only with firmware that supports them"
+            );
+        }
         if self.items.is_empty() {
             return format!(
                 "{name}: the names of this unit are not known; give an address such as 0x0010"
@@ -317,7 +335,10 @@ fn registers(description: &Description, register: &Register) -> Vec<Item> {
         table: Table::Word,
         address: register.address.wrapping_add(index.wrapping_mul(each)),
         words: each,
-        meaning: Meaning::Value(register.value.clone()),
+        meaning: match (register.address, &*register.name) {
+            (MAX_ON, "MAX_ON") => Meaning::LongestOn,
+            _ => Meaning::Value(register.value.clone()),
+        },
         writable: register.writable,
         setting: register.writable && is_setting(register),
         restart: register.restart,
@@ -490,6 +511,10 @@ mod tests {
         );
         assert!(Book::default().find("BAUD").is_err());
         assert!(Book::default().find("16").is_ok());
+        let text = |book: Book| book.find("5.1.dead-time").unwrap_err().to_string();
+        assert!(text(book(Module::Do4)).contains("this unit has no DEAD_TIME"));
+        let with_stage = super::book(&MODIO_08, Module::None, (1, 1));
+        assert!(text(with_stage).contains("similar names"));
     }
 
     #[test]

@@ -1,9 +1,17 @@
 //! Values of points and registers, formatted for people and programs, and parsed from the user's input.
 
+mod time;
+
 use modio_description::{Field, Table, Unit, Value, Values};
+use register_map::codes::LinkAction;
+use register_map::stage::MINUTES;
 use serde_json::{Value as Json, json};
 
+use time::{LONGEST_ON, between};
+pub use time::{steps, time_of_pulse};
+
 use crate::failure::Failure;
+use crate::links::action_of;
 use crate::names::{Item, Meaning, number_of};
 
 /// A value as read: one or more registers, or a bit.
@@ -37,7 +45,10 @@ pub fn show(item: &Item, words: &[u16], raw: bool) -> Shown {
         },
         Meaning::Analog(reading) if !raw => number(signed(first, reading.min), &reading.unit),
         Meaning::Value(value) => register(value, words, raw),
-        Meaning::Analog(_) | Meaning::Unknown => number(first.into(), &Unit::default()),
+        Meaning::LongestOn if !raw => time::longest_on(first),
+        Meaning::Analog(_) | Meaning::LongestOn | Meaning::Unknown => {
+            number(first.into(), &Unit::default())
+        }
     }
 }
 
@@ -112,7 +123,7 @@ fn shown_fields(fields: &[Field], words: &[u16], raw: bool) -> String {
 }
 
 /// Returns the words of fields in `text`, which are separated by commas. Those that are missing at the end have their
-/// defaults. `none` stands for the defaults of all.
+/// defaults. `none` stands for the defaults of all. The time of a pulse is a number in 0.1 s, or has a unit.
 fn fields_of(item: &Item, fields: &[Field], text: &str, raw: bool) -> Result<Vec<u16>, String> {
     let mut texts = text.split(',').map(str::trim).peekable();
     if text.trim().eq_ignore_ascii_case("none") {
@@ -124,6 +135,12 @@ fn fields_of(item: &Item, fields: &[Field], text: &str, raw: bool) -> Result<Vec
             all.push(field.default);
             continue;
         };
+        let is_time =
+            matches!(all[..], [_, action] if action_of(action) == Some(LinkAction::Pulse));
+        if is_time && number_of(text).is_none() && text.ends_with(char::is_alphabetic) {
+            all.push(time_of_pulse(text)?);
+            continue;
+        }
         let field_item = Item {
             name: field.name.clone(),
             words: 1,
@@ -222,7 +239,10 @@ fn words(item: &Item, text: &str, raw: bool) -> Result<Vec<u16>, String> {
             _ => return Err("it is on or off".to_owned()),
         },
         Meaning::Analog(reading) => {
-            let takes = || range(reading.min.into(), reading.max.into(), &reading.unit);
+            let takes = || {
+                let range = range(reading.min.into(), reading.max.into(), &reading.unit);
+                range + &between(text, &reading.unit)
+            };
             let number = steps(text, &reading.unit).ok_or_else(takes)?;
             let allowed = i64::from(reading.min)..=i64::from(reading.max);
             // A unit may describe a range that its register cannot have.
@@ -253,7 +273,8 @@ fn words(item: &Item, text: &str, raw: bool) -> Result<Vec<u16>, String> {
             let word = word.and_then(|word| u16::try_from(word).ok());
             word.filter(|word| item.allows(*word))
                 .ok_or_else(|| match &item.values {
-                    Some(values) => takes(values, unit),
+                    Some(values @ Values::OneOf(_)) => takes(values, unit),
+                    Some(values) => takes(values, unit) + &between(text, unit),
                     None => "it takes 0 to 65535".to_owned(),
                 })?
         }
@@ -273,6 +294,11 @@ fn words(item: &Item, text: &str, raw: bool) -> Result<Vec<u16>, String> {
         Meaning::Value(Value::Fields { fields, .. }) => {
             return fields_of(item, fields, text, raw);
         }
+        Meaning::LongestOn => match text.get(..2) {
+            Some("0x" | "0X") => word.filter(|word| *word != MINUTES),
+            _ => time::longest_on_of(text),
+        }
+        .ok_or_else(|| format!("it takes {LONGEST_ON}"))?,
         Meaning::Value(Value::Opaque) => {
             return Err("it has no values that can be written".to_owned());
         }
@@ -282,7 +308,7 @@ fn words(item: &Item, text: &str, raw: bool) -> Result<Vec<u16>, String> {
 }
 
 /// Returns the address of a point, `p1.1` or `1.1`.
-fn point_of(text: &str) -> Option<u16> {
+pub fn point_of(text: &str) -> Option<u16> {
     let (port, channel) = text
         .strip_prefix(['p', 'P'])
         .unwrap_or(text)
@@ -298,19 +324,6 @@ fn check_raw(item: &Item, word: u16) -> Result<(), String> {
         (_, Some(values)) if !item.allows(word) => Err(takes(values, &Unit::default())),
         _ => Ok(()),
     }
-}
-
-/// Returns a quantity in steps of the unit; `None` when it is not a number, has another unit, or lies between two
-/// steps.
-pub fn steps(text: &str, unit: &Unit) -> Option<i64> {
-    let shown = unit_name(&unit.code);
-    let text = text.trim();
-    let number = text.strip_suffix(shown).or(text.strip_suffix(&unit.code));
-    let quantity: f64 = number.unwrap_or(text).trim().parse().ok()?;
-    let steps = quantity / 10_f64.powi(unit.exponent.into());
-    let whole = steps.round();
-    let near = (steps - whole).abs() < 1e-6 && whole.abs() < 1e9;
-    near.then_some(whole as i64 - i64::from(unit.offset))
 }
 
 /// Describes the values that a register allows, in its unit.
@@ -428,11 +441,19 @@ mod tests {
             assert_eq!(parse(&link, text, false), Ok(words.to_vec()));
         }
         assert_eq!(show(&link, &[16, 3, 0, 0], true).text, "p5.1, 3");
-        assert_eq!(parse(&link, "5.1,TOGGLE", false), Ok(vec![16, 3, 0, 0]));
+        for (text, words) in [
+            ("5.1,TOGGLE", [16, 3, 0, 0]),
+            ("p1.1, pulse, 1.5min", [0, 4, 900, 0]),
+            ("p1.1, pulse if alone, 0x1F", [0, 0x104, 31, 0]),
+        ] {
+            assert_eq!(parse(&link, text, false), Ok(words.to_vec()), "{text}");
+        }
         let wrong = |text| parse(&link, text, false).unwrap_err().to_string();
         assert!(wrong("p9.1").contains("source: it takes a point such as p1.1"));
         assert!(wrong("p5.1, blink").contains("action: it takes 0 = none, 1 = follow"));
         assert!(wrong("p5.1, set, 1, 2, 3").contains("it has 4 parts"));
+        assert!(wrong("p5.1, pulse, 2h").contains("0.1 to 6553.5 s, not \"2h\""));
+        assert!(wrong("p5.1, set, 90s").contains("time or high: it takes 0 to 65535"));
     }
 
     #[test]

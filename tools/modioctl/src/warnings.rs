@@ -1,5 +1,7 @@
 //! Warnings about settings that are allowed and probably not what the user wants, one line each.
 
+pub mod stage;
+
 use std::collections::BTreeSet;
 
 use register_map::codes::{LinkAction, Scale, Signal};

@@ -13,7 +13,7 @@ use crate::links::{self, Order, action_of, acts, is_alone, sentence};
 use crate::names::{Book, Item};
 use crate::output;
 use crate::value::point_name;
-use crate::warnings::of_links;
+use crate::warnings::{of_links, stage};
 
 /// Prints the links of the unit.
 pub async fn list(device: &mut Device, json: bool) -> Result<(), Failure> {
@@ -50,21 +50,30 @@ impl Device {
         }
     }
 
-    /// Prints warnings about all links after these settings were written, if one of them concerns links. As
-    /// [`Self::warn_of`], it does not fail.
-    pub async fn warn_of_links(&mut self, written: &[(Item, Vec<u16>)]) {
-        let concerns = |item: &Item| {
+    /// Prints warnings after these settings were written: about all links, and about the times of the outputs that the
+    /// settings concern. As [`Self::warn_of`], it does not fail.
+    pub async fn warn_of_settings(&mut self, written: &[(Item, Vec<u16>)]) {
+        let of_links = |item: &Item| {
             let of_source = item.name.ends_with(".range") || item.name.ends_with(".scale");
             of_source || item.name.contains(".link") || item.name == "COMM_TIMEOUT"
         };
-        if written.iter().any(|(item, _)| concerns(item))
+        let about_links = written.iter().any(|(item, _)| of_links(item));
+        let about_stage = written
+            .iter()
+            .any(|(item, _)| stage::pair_of(item).is_some());
+        if (about_links || about_stage)
             && let Ok(book) = fetch_set(self).await
         {
-            let outputs = book.points();
-            let items = outputs.flat_map(|output| links::of(&book, &output.name));
-            let items: Vec<_> = items.collect();
-            if let Ok(values) = self.read_items(&items).await {
-                self.warn_of(&book, &values).await;
+            if about_links {
+                let outputs = book.points();
+                let items = outputs.flat_map(|output| links::of(&book, &output.name));
+                let items: Vec<_> = items.collect();
+                if let Ok(values) = self.read_items(&items).await {
+                    self.warn_of(&book, &values).await;
+                }
+            }
+            if about_stage {
+                self.warn_of_stage(&book, written).await;
             }
         }
     }
@@ -114,6 +123,7 @@ pub async fn link(device: &mut Device, text: &str, done: &Note) -> Result<(), Fa
     if let Some(note) = note {
         eprintln!("modioctl: note: {note}");
     }
+    device.warn_of_stage(&book, &changes).await;
     let words: Vec<_> = changes.into_iter().map(|(_, words)| words).collect();
     device.warn_of(&book, &words).await;
     Ok(())

@@ -13,6 +13,7 @@ mod raw;
 mod read;
 mod scan;
 mod sniff;
+mod stage;
 mod update;
 mod watch;
 mod write;

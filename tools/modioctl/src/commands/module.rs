@@ -25,6 +25,7 @@ pub async fn run(mut device: Device, options: Module, note: &Note) -> Result<(),
     }
     let item = book.find(&format!("p{port}.module"))?;
     let words = parse(&item, &module, false)?;
+    let pairs = device.pairs(&book).await?;
     device.unlock().await?;
     let name = &item.name;
     let write = device.write_item(&item, &words);
@@ -62,7 +63,9 @@ pub async fn run(mut device: Device, options: Module, note: &Note) -> Result<(),
     output::line(format_args!(
         "port {port}: {}, saved and in force; state: {state}",
         show(&item, &words, false)
-    ))
+    ))?;
+    device.warn_of_lost_pairs(&pairs).await;
+    Ok(())
 }
 
 /// Restarts the unit.

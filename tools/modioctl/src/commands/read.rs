@@ -5,7 +5,7 @@ use serde_json::{Value as Json, json};
 use crate::cli::Read;
 use crate::device::{Device, fetch};
 use crate::failure::Failure;
-use crate::names::Item;
+use crate::names::{Item, Meaning};
 use crate::output;
 use crate::value::show;
 
@@ -43,6 +43,9 @@ pub fn as_json(item: &Item, words: &[u16], raw: bool) -> Json {
         "address": item.address,
         "words": words,
         "value": shown.json,
-        "unit": shown.unit,
+        "unit": match &item.meaning {
+            Meaning::LongestOn if !raw => "s",
+            _ => &shown.unit,
+        },
     })
 }

@@ -5,6 +5,7 @@ use serde_json::json;
 
 use super::note::{Note, Progress};
 use super::read::as_json;
+use super::stage::Off;
 use crate::cli::Write;
 use crate::device::{Device, fetch};
 use crate::failure::Failure;
@@ -17,7 +18,8 @@ use crate::value::{parse, show};
 pub const UNSAVED: &str = "not saved: save with `modioctl config save`";
 
 /// Writes items by name or address, after all of them have been checked. When a name or a value is wrong, nothing is
-/// written. Reports outputs that links hold, where the unit has accepted the write.
+/// written. Reports outputs that links hold, and outputs that MAX_ON or their pair keeps off, where the unit has accepted
+/// the write.
 pub async fn run(
     device: &mut Device,
     options: &Write,
@@ -31,14 +33,19 @@ pub async fn run(
         let words = parse(&item, text, options.raw)?;
         checked.push((item, words));
     }
+    let pairs = device.pairs_before(&book, &checked).await?;
     device.write_items(&checked, note).await?;
     let bits = checked.iter().map(|(item, _)| item);
     let bits = bits.filter(|item| item.meaning == Meaning::Bit);
     let held = device.held(&book, bits).await?;
+    let off = device.off(&book, &held, &checked).await?;
     let is_unsaved = checked.iter().any(|(item, _)| item.setting);
     if json {
         let each = checked.iter().map(|(item, words)| {
+            let off = off.get(&item.name);
+            let words = if off.is_some() { &vec![0] } else { words };
             let mut value = as_json(item, words, options.raw);
+            value["off_by"] = json!(off.and_then(Off::by));
             value["held_by"] = json!(held.get(&item.name).map_or(&[][..], Vec::as_slice));
             value
         });
@@ -46,12 +53,17 @@ pub async fn run(
         if is_unsaved {
             eprintln!("modioctl: {UNSAVED}");
         }
-        device.warn_of_links(&checked).await;
+        device.warn_of_settings(&checked).await;
+        device.warn_of_lost_pairs(&pairs).await;
         return Ok(());
     }
     for (item, words) in &checked {
         if let Some(sources) = held.get(&item.name) {
             output::line(format_args!("{}: {}", item.name, held::text(sources)))?;
+            continue;
+        }
+        if let Some(off) = off.get(&item.name) {
+            output::line(format_args!("{}: {}", item.name, off.text()))?;
             continue;
         }
         let when = if item.restart {
@@ -65,7 +77,8 @@ pub async fn run(
     if is_unsaved {
         output::line(UNSAVED)?;
     }
-    device.warn_of_links(&checked).await;
+    device.warn_of_settings(&checked).await;
+    device.warn_of_lost_pairs(&pairs).await;
     Ok(())
 }
 

@@ -24,6 +24,7 @@ mod program;
 mod restart;
 mod scanning;
 mod served;
+mod stage;
 mod strange;
 mod terminal;
 mod trouble;

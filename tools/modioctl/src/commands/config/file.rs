@@ -27,6 +27,10 @@ pub fn text(book: &Book, items: &[Item], values: &[Vec<u16>]) -> Result<String, 
         let shown = show(item, words, false);
         let value = match &shown.json {
             serde_json::Value::String(name) => toml::Value::String(name.clone()).to_string(),
+            // Some of these values are in minutes.
+            _ if item.meaning == Meaning::LongestOn => {
+                toml::Value::String(shown.to_string()).to_string()
+            }
             _ => shown.text.clone(),
         };
         let comment = comment(item, &shown.unit);
@@ -43,7 +47,9 @@ fn comment(item: &Item, unit: &str) -> String {
     let takes = match (&item.meaning, &item.values) {
         (Meaning::Value(Value::Number(of)), Some(values)) => takes(values, of),
         (Meaning::Value(Value::Codes(_)), _) => String::new(),
-        (Meaning::Value(Value::Fields { .. }), _) => crate::listing::values(item),
+        (Meaning::Value(Value::Fields { .. }) | Meaning::LongestOn, _) => {
+            crate::listing::values(item)
+        }
         (_, Some(values)) if unit.is_empty() => takes(values, &Unit::default()),
         _ => String::new(),
     };
@@ -84,13 +90,20 @@ fn check(book: &Book, file: &str, text: &str) -> Result<Vec<Setting>, Failure> {
     check_board(book.of_modio()?, file, &lines)?;
     let (book, unknown) = with_modules(book, &lines)?;
     let mut settings = Vec::new();
+    // A file has these lines for every point, and one message is enough.
+    let mut lacking = lines.iter().filter(|line| book.lacks_stage(&line.name));
+    let (first, more) = (lacking.next(), lacking.count());
     for line in &lines {
         match setting(&book, &line.name, &line.value) {
             Ok(setting) => settings.push(setting),
             // Without the module it is not known which settings its points have.
             Err(_) if unknown.contains(&port_of(&line.name)) && !line.name.ends_with("module") => {}
+            Err(_) if book.lacks_stage(&line.name) && first != Some(line) => {}
             Err(failure) => {
-                let text = failure.to_string();
+                let mut text = failure.to_string();
+                if more > 0 && first == Some(line) {
+                    let _ = write!(text, " ({more} more lines have such settings)");
+                }
                 wrong.entry(line.number).or_insert(text);
             }
         }
@@ -262,6 +275,17 @@ mod tests {
     }
 
     #[test]
+    fn exported_longest_time_on_is_the_same_register_when_it_is_imported() {
+        let unit = book(&MODIO_08, Module::Do4, (0, 0));
+        let items =
+            ["p1.1.max_on", "p1.2.max_on", "p1.3.max_on"].map(|name| unit.find(name).unwrap());
+        let words = [0, 900, 0x800A].map(|word| vec![word]);
+        let text = text(&unit, &items, &words).unwrap();
+        let settings = ["p1.1.max_on=0", "p1.2.max_on=900", "p1.3.max_on=32778"];
+        assert_eq!(checked_for(&unit, &text).unwrap(), settings, "{text}");
+    }
+
+    #[test]
     fn links_are_those_of_the_modules_in_the_file() {
         let unit = book(&MODIO_08, Module::None, (0, 0));
         let text = "p1.module = '2relay'\np1.3.link1 = 'p1.1, toggle'\np1.4.link2 = 'none'\n";
@@ -295,6 +319,20 @@ mod tests {
             let start = format!("  line {number}: {part}");
             assert!(line.starts_with(&start), "{line:?}, not {start:?}");
         }
+    }
+
+    #[test]
+    fn times_of_outputs_for_a_unit_without_them_are_reported_in_one_line() {
+        let wrong =
+            checked("p5.module = '4do'\np5.1.dead_time = 0.5\np5.2.max_on = 0\np5.3.min_off = 0\n");
+        let wrong = wrong.unwrap_err();
+        let start =
+            "unit.toml, line 2: p5.1.dead_time: this unit has no DEAD_TIME, MAX_ON and MIN_OFF";
+        assert!(wrong.starts_with(start), "{wrong}");
+        assert!(
+            wrong.ends_with("(2 more lines have such settings)"),
+            "{wrong}"
+        );
     }
 
     #[test]

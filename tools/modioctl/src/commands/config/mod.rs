@@ -7,6 +7,7 @@ use std::path::Path;
 
 use register_map::codes::Command;
 use register_map::configuration;
+use register_map::stage;
 
 use super::note::{Note, Progress, UNDO};
 use super::read;
@@ -44,10 +45,12 @@ pub async fn run(
                 .map(|(name, value)| file::setting(&book, name, value))
                 .collect::<Result<Vec<_>, _>>()?;
             let mut progress = Progress::of_settings(note, changes.len());
+            let pairs = device.pairs_before(&book, &changes).await?;
             device.unlock().await?;
             write(&mut device, &changes, &mut progress).await?;
             output::line("written, but not saved: save with `modioctl config save`")?;
-            device.warn_of_links(&changes).await;
+            device.warn_of_settings(&changes).await;
+            device.warn_of_lost_pairs(&pairs).await;
             Ok(())
         }
         Config::Save => {
@@ -75,8 +78,10 @@ pub async fn run(
             if !modules.is_empty() && !yes {
                 agree(&modules.join(", ")).await?;
             }
+            let pairs = device.pairs_before(&book, &wanted).await?;
             import(&mut device, &wanted, &file, rows.len(), note).await?;
-            device.warn_of_links(&wanted).await;
+            device.warn_of_settings(&wanted).await;
+            device.warn_of_lost_pairs(&pairs).await;
             finish(device, restart).await
         }
         Config::Reset { restart } => {
@@ -84,7 +89,9 @@ pub async fn run(
             let (items, values) = settings(&mut device, &book).await?;
             let changes = items.iter().zip(&values);
             let changes = changes.filter(|(item, words)| words[..] != [item.default]);
-            device.warn_of_line(changes.map(|(item, _)| item.address));
+            let changed: Vec<_> = changes.map(|(item, _)| item.address).collect();
+            device.warn_of_line(changed.iter().copied());
+            let pairs = device.pairs(&book).await?;
             let order = Command::LoadDefaults.code();
             note.during(
                 format_args!("the factory settings may be in force{UNDO}"),
@@ -92,6 +99,7 @@ pub async fn run(
                 device.order(order, "loading the factory settings"),
             )
             .await?;
+            device.warn_of_lost_pairs(&pairs).await;
             note.during(
                 "the factory settings are in force, and may be saved: repeat the command",
                 format_args!("the factory settings are in force{UNDO}"),
@@ -133,11 +141,18 @@ async fn write(
 }
 
 /// Returns the requests that write these settings: names, first address and words. Modules are first, because a change
-/// of module resets the settings of its points. Registers with consecutive addresses are in one request, so that the
+/// of module resets the settings of its points. Times of outputs are next: a pair is one before START, SAFE or a link can
+/// switch both of it on. Registers with consecutive addresses are in one request, so that the
 /// unit checks FORMAT and MODE together.
 fn runs(changes: &[Setting]) -> Vec<(Vec<&str>, u16, Vec<u16>)> {
     let mut sorted: Vec<_> = changes.iter().collect();
-    sorted.sort_by_key(|(item, _)| (!is_module(item), item.address));
+    sorted.sort_by_key(|(item, _)| {
+        (
+            !is_module(item),
+            !stage::contain(item.address),
+            item.address,
+        )
+    });
     let mut runs: Vec<(Vec<&str>, u16, Vec<u16>)> = Vec::new();
     for (item, words) in sorted {
         match runs.last_mut() {
@@ -299,4 +314,47 @@ async fn tell_restart(device: &mut Device) -> Result<(), Failure> {
         output::line("some settings take effect after a restart: use `modioctl reboot`")?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use register_map::Module;
+    use register_map::board::MODIO_08;
+
+    use super::*;
+    use crate::names::book;
+
+    #[test]
+    fn modules_are_written_first_and_then_the_times_of_outputs() {
+        let book = book(&MODIO_08, Module::Do4, (0, 0));
+        let names = [
+            "p1.1.link1",
+            "p1.1.safe",
+            "p1.1.start",
+            "p1.1.filter",
+            "p1.1.max_on",
+            "p1.1.dead_time",
+            "p1.2.dead_time",
+            "p1.module",
+        ];
+        let changes = names.map(|name| {
+            let item = book.find(name).unwrap();
+            let words = vec![0; item.words.into()];
+            (item, words)
+        });
+        let order: Vec<_> = runs(&changes)
+            .into_iter()
+            .map(|(names, ..)| names.join(" "))
+            .collect();
+        let wanted = [
+            "p1.module",
+            "p1.1.dead_time p1.2.dead_time",
+            "p1.1.max_on",
+            "p1.1.filter",
+            "p1.1.safe",
+            "p1.1.start",
+            "p1.1.link1",
+        ];
+        assert_eq!(order, wanted);
+    }
 }

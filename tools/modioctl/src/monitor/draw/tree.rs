@@ -4,6 +4,7 @@ use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
 use ratatui::text::{Line, Span};
+use register_map::codes::ChannelStatus;
 use tokio::time::Instant;
 
 use super::{BAD, GOOD, OLD, SELECTED, clip, is_focused, titled};
@@ -139,10 +140,12 @@ fn judged(model: &Model, name: &str, now: Instant) -> (String, Style) {
     });
     let code = value.words.first().copied().unwrap_or_default();
     let is_module = name.ends_with("module_state");
+    let is_good = [ChannelStatus::Waits, ChannelStatus::Ended].map(ChannelStatus::code);
     match (fresh, code) {
         (false, _) => (format!("old: {text}"), OLD),
         (true, 0) => (text, GOOD),
         (true, 1) if is_module => (String::new(), OLD),
+        (true, code) if !is_module && is_good.contains(&code) => (text, GOOD),
         (true, _) => (format!("× {text}"), BAD),
     }
 }
