@@ -1,5 +1,7 @@
 //! A case: its name, the section that it tests, its needs, and the function that runs it.
 
+use crate::hil::Hil;
+use crate::hil::bench_file::Wire;
 use crate::tester::Tester;
 
 pub use crate::check::{Check, Failure, Part, Stop, skip};
@@ -51,6 +53,30 @@ pub enum Need {
     Pulses,
     /// The bench file has analog wires.
     AnalogWires,
+}
+
+impl Need {
+    /// Returns the reason why a need of a bench is not met, if it is not met. Other needs are met here.
+    pub fn unmet(self, bench: &Hil) -> Option<&'static str> {
+        let mut wires = bench.wires.iter();
+        let (met, why) = match self {
+            Self::Requests => (bench.requests > 0, "measures with --requests only"),
+            Self::Wires => (
+                wires.any(Wire::is_digital),
+                "no [[wire]] in a bench file: --bench",
+            ),
+            Self::Pulses => (
+                wires.any(Wire::has_pulses),
+                "no [[wire]] with pulses in a bench file: --bench",
+            ),
+            Self::AnalogWires => (
+                wires.any(|wire| !wire.is_digital()),
+                "no [[analog]] in a bench file: --bench",
+            ),
+            _ => return None,
+        };
+        (!met).then_some(why)
+    }
 }
 
 /// Where the demand of a case comes from.

@@ -176,9 +176,11 @@ impl Cli {
             bench.wires = file.wires;
         }
         let hil = self.of_bench();
+        let is_timed = |case: &Case| case.needs.contains(&Need::Requests);
+        let asks = hil.requests > 0 && self.cases()?.iter().any(is_timed);
         ensure!(
-            hil.requests > 0 || hil.rates.is_empty() && hil.limit.is_none(),
-            "--rates and --limit need requests: --requests N"
+            asks || hil.rates.is_empty() && hil.limit.is_none(),
+            "--rates and --limit need requests: --requests N, and the case timing/each-rate"
         );
         self.can_test(&hil)?;
         Ok(self)
@@ -188,7 +190,7 @@ impl Cli {
     fn can_test(&self, hil: &Hil) -> Result<()> {
         let mut reasons = Vec::new();
         for case in self.cases()? {
-            let why = case.needs.iter().find_map(|need| hil.lacks(*need));
+            let why = case.needs.iter().find_map(|need| need.unmet(&hil));
             // Where time is not exact, the other cases of the group `timing` cannot run.
             if why.is_none() && (self.is_exact() || !case.needs.contains(&Need::Exact)) {
                 return Ok(());

@@ -232,7 +232,7 @@ fn lacking(need: Need, endpoint: &dyn Endpoint, target: &Target) -> Option<Strin
         Need::Rtu => (target.mode == Mode::Rtu, "about RTU framing"),
         Need::Ascii => (target.mode == Mode::Ascii, "about ASCII framing: --ascii"),
         Need::Requests | Need::Wires | Need::Pulses | Need::AnalogWires => {
-            return target.hil.lacks(need).map(str::to_owned);
+            return need.unmet(&target.hil).map(str::to_owned);
         }
     };
     (!met).then(|| why.to_owned())

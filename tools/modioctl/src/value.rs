@@ -11,7 +11,6 @@ use time::{LONGEST_ON, between};
 pub use time::{steps, time_of_pulse};
 
 use crate::failure::Failure;
-use crate::links::action_of;
 use crate::names::{Item, Meaning, number_of};
 
 /// A value as read: one or more registers, or a bit.
@@ -135,8 +134,7 @@ fn fields_of(item: &Item, fields: &[Field], text: &str, raw: bool) -> Result<Vec
             all.push(field.default);
             continue;
         };
-        let is_time =
-            matches!(all[..], [_, action] if action_of(action) == Some(LinkAction::Pulse));
+        let is_time = matches!(all[..], [_, action] if LinkAction::from_code(action & 0xFF) == Some(LinkAction::Pulse));
         if is_time && number_of(text).is_none() && text.ends_with(char::is_alphabetic) {
             all.push(time_of_pulse(text)?);
             continue;

@@ -140,6 +140,11 @@ fn cases_that_all_lack_something_of_the_bench_are_an_error_that_says_what() {
             "need requests: --requests N",
         ),
         ("", "--limit 9 --requests 0", "need requests: --requests N"),
+        (
+            WIRE,
+            "--only wires --rates 9600",
+            "and the case timing/each-rate",
+        ),
     ] {
         let error = with_file(file, arguments).unwrap_err();
         let right = error.contains(reason) && !error.contains('\n');

@@ -174,8 +174,9 @@ class StartedAgain(OnPage):
         first.close()
         expect(page.locator("#connection")).to_have_text(re.compile("^OFFLINE: .* does not answer"))
         expect(page.locator("#board")).to_have_attribute("inert", "")
-        # One answer of the new one is lost.
-        page.route("**/api/frames", lambda route: route.fulfill(status=503), times=1)
+        # Some answers of the new one are lost.
+        for path in ("frames", "endpoints"):
+            page.route(f"**/api/{path}", lambda route: route.fulfill(status=503), times=1)
         second = Simulator.of(http=address, module="4do")
         self.addCleanup(second.close)
         master = second.master()
@@ -184,3 +185,4 @@ class StartedAgain(OnPage):
         self.good(master.write_coil(0x0010, True))
         expect(page.get_by_role("switch", name="Digital output p5.1")).to_have_text("conducts")
         expect(page.locator("#frames tr")).to_have_count(2)
+        expect(page.locator("#endpoints dd")).to_have_text(list(second.endpoints().values()))

@@ -10,11 +10,19 @@ const NAMES = {
 };
 
 let endpoints = {};
+let isAnswered = false;
 let shown = null;
+
+/** Whether the simulator has said which endpoints it has. */
+export const isKnown = () => isAnswered;
 
 /** Reads the endpoints of the simulator and shows them. */
 export async function fetchEndpoints() {
-  endpoints = await get("/api/endpoints") ?? {};
+  isAnswered = false;
+  const answer = await get("/api/endpoints").catch(() => null);
+  if (answer === null) return;
+  isAnswered = true;
+  endpoints = answer;
   byId("endpoints").replaceChildren(...Object.entries(endpoints).flatMap(([name, at]) =>
     [element("dt", {}, NAMES[name] ?? name), element("dd", {}, element("code", {}, at))]));
   if (shown !== null) show(shown);

@@ -20,7 +20,7 @@ let events = null;
 /** Shows the first state of a stream. The simulator may have started again since the last one. */
 function begin(state) {
   show(state);
-  connect.fetchEndpoints().catch(() => {});
+  connect.fetchEndpoints();
   frames.fetchMissed();
 }
 
@@ -78,11 +78,13 @@ async function fetchFindings() {
   byId("findings").replaceChildren(...(items.length > 0 ? items : [element("li", {}, "none")]));
 }
 
-/** Reads the boards, the findings and the faults, which are in no event, and again the frames if the answer was lost. */
+/** Reads the boards, the findings and the faults, which are in no event, and again the frames and the endpoints if the answer
+ * was lost. */
 function poll() {
   boards.refresh(choose).catch(() => {});
   fetchFindings().catch(() => {});
   if (frames.isHolding()) frames.fetchMissed();
+  if (!connect.isKnown()) connect.fetchEndpoints();
   if (!byId("faults-section").hidden) faults.refresh();
 }
 
