@@ -16,9 +16,14 @@ use super::{Config, HEARTBEAT_ALONE};
 ///
 /// # Errors
 ///
-/// Exception 02 when the span goes beyond the last one.
+/// Exception 02 when the span goes beyond the end of its block: DEADBAND, or the stage.
 fn check_behind<B: Board>(span: Span) -> Result<(), Exception> {
-    if span.end() <= B::ROW.behind_links().end.into() {
+    let block_end = if span.start() < stage::DEAD_TIME {
+        stage::DEAD_TIME
+    } else {
+        B::ROW.behind_links().end
+    };
+    if span.end() <= block_end.into() {
         Ok(())
     } else {
         Err(Exception::IllegalDataAddress)

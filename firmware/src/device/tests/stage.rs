@@ -85,10 +85,11 @@ fn times_are_settings_with_the_values_of_their_rules() {
     assert_eq!(rig.read(MIN_OFF + 31, 2), Err(2));
     assert_eq!(rig.write(MIN_OFF + 31, &[0, 0]), Err(2));
     assert_eq!(
-        rig.read(DEAD_TIME - 1, 97).unwrap().len(),
-        97,
-        "with DEADBAND"
+        rig.read(DEAD_TIME - 1, 2),
+        Err(2),
+        "DEADBAND is another block"
     );
+    assert_eq!(rig.read(DEAD_TIME, 96).unwrap().len(), 96);
 
     rig.device.config.begin_save();
     let saved: Vec<_> = rig.device.config.to_save().changed_from(0).collect();
