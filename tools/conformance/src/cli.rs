@@ -190,7 +190,7 @@ impl Cli {
     fn can_test(&self, hil: &Hil) -> Result<()> {
         let mut reasons = Vec::new();
         for case in self.cases()? {
-            let why = case.needs.iter().find_map(|need| need.unmet(&hil));
+            let why = case.needs.iter().find_map(|need| need.unmet(hil));
             // Where time is not exact, the other cases of the group `timing` cannot run.
             if why.is_none() && (self.is_exact() || !case.needs.contains(&Need::Exact)) {
                 return Ok(());

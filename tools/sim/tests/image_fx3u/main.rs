@@ -315,7 +315,8 @@ fn scan_finds_units_whose_start_bits_are_seen_by_an_interrupt() {
         let lost: Vec<u16> = (master.find_all().into_iter())
             .map(|(serial, _)| overruns(&mut master, serial))
             .collect();
-        assert!(lost.iter().sum::<u16>() <= 2, "{baud:?}: {lost:?}");
+        // 32 when each of its characters takes longer than that, 1 to 4 by the layout of the code since they do not.
+        assert!(lost.iter().sum::<u16>() <= 8, "{baud:?}: {lost:?}");
     }
 }
 
