@@ -8,8 +8,8 @@
 
 use modio_drivers::CHANNELS;
 
-/// A master who gives 1 again to an output that is on repeats himself. Within this time in ms after the last repetition
-/// another 1 is one, too, even if MAX_ON has ended the output meanwhile.
+/// A master who gives 1 again to an output that is on repeats himself. For this time in ms after his last repetition, a
+/// further 1 is a repetition too, also when MAX_ON has switched the output off in between.
 const REPEAT_MS: u32 = 60_000;
 
 /// The first channels of the pairs.
@@ -220,8 +220,8 @@ impl Stage {
         self.order(coils, named & !ignored, on & !ignored & !cancelled)
     }
 
-    /// Takes what level links hold from now on. One that begins to hold begins anew, and one that wants 0 ends the end by
-    /// MAX_ON.
+    /// Takes what level links hold from now on. An output that MAX_ON has ended may go on again when a link begins to hold it,
+    /// and after its link has wanted 0.
     pub fn take_held(&mut self, held: Held) {
         self.ended &= !(held.outputs & !(self.held.outputs & held.on));
         self.held = held;

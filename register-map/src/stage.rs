@@ -29,9 +29,6 @@ pub const REGISTERS: u16 = 3 * COUNT;
 /// The addresses.
 pub const ADDRESSES: Range<u16> = DEAD_TIME..DEAD_TIME + REGISTERS;
 
-/// The first registers: of DEAD_TIME, MAX_ON and MIN_OFF.
-pub const FIRST: [u16; 3] = [DEAD_TIME, MAX_ON, MIN_OFF];
-
 /// A value of MAX_ON that has this bit has minutes in the others.
 pub const MINUTES: u16 = 0x8000;
 

@@ -264,8 +264,9 @@ impl<B: Board> Device<B> {
         }
     }
 
-    /// Returns the digital channels of a slot for the scan to drive, channel 1 in bit 0, `ms` milliseconds after the last scan, 0 for a scan because of a
-    /// write. Outputs that links hold have what the links want, whatever a request has written since the links ran.
+    /// Returns the digital channels of a slot for the scan to drive, channel 1 in bit 0, `ms` milliseconds after the last
+    /// scan, 0 for a scan because of a write. Outputs that links hold have what the links want, whatever a request has written
+    /// since the links ran.
     pub fn drive(&mut self, slot: usize, ms: u32) -> u8 {
         let links = self
             .linking

@@ -17,7 +17,7 @@ pub struct Points<B: Board> {
     pub(super) ports: Each<B::Ports, IoPort<B>>,
     /// Outputs that are at SAFE and were not commanded since, the first port's channel 1 in bit 0.
     pub(super) at_safe: Each<B::Kept, u32>,
-    /// Ports with an output that has a time of the stage, the first one in bit 0.
+    /// Ports whose stage has something to do, the first one in bit 0.
     pub(super) staged: u8,
 }
 

@@ -174,7 +174,7 @@ impl Unit {
             all[2]
         };
         let to_first_byte = median(|cost| cost.to_first_byte);
-        // An instruction that another interrupt breaks off counts twice.
+        // One run in some hundred has one instruction more, of the same code, when another interrupt is pending at its end.
         let byte_in = median(|cost| cost.byte_in);
         costs.sort_by_key(|cost| cost.transaction);
         let [_, _, middle, _, _] = costs;
